@@ -1,0 +1,69 @@
+//! The wire out of a drive: every signal of the diagram in models/drive.md section 1.
+
+/// All wires of one axis at one instant: state before the plant step together with the commands of the tick.
+/// `lu` is mm or rad.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct AxisSignals {
+    /// x_set: set-point as sent by the interpolator.
+    pub position_setpoint_lu: f64,
+    /// x_ref: set-point after the balancing delay.
+    pub position_reference_lu: f64,
+    /// x: load side.
+    pub position_actual_lu: f64,
+    /// x_meas: as the position encoder gives it.
+    pub position_measured_lu: f64,
+    /// e_fol = x_ref - x_meas.
+    pub control_deviation_lu: f64,
+    /// e_trk = x_set - x.
+    pub following_error_lu: f64,
+    /// v_cmd: output of the position controller with feed-forward, clamped.
+    pub velocity_command_lu_s: f64,
+    /// v_ff (VFFWS).
+    pub velocity_feedforward_lu_s: f64,
+    /// v.
+    pub velocity_actual_lu_s: f64,
+    /// w_ref.
+    pub motor_speed_reference_rad_s: f64,
+    /// w.
+    pub motor_speed_rad_s: f64,
+    /// t_ref.
+    pub torque_reference_n_m: f64,
+    /// t_ff (TFFWS).
+    pub torque_feedforward_n_m: f64,
+    /// t_fric: Tc sgn w + B w; at rest clamp(Kt i - Tg, ±Ts).
+    pub friction_torque_n_m: f64,
+    /// t_grav, outside load included.
+    pub gravity_torque_n_m: f64,
+    /// i_ref.
+    pub current_reference_a: f64,
+    /// i.
+    pub current_a: f64,
+    /// i_avg: mean over the position period that ends at this tick.
+    pub current_mean_a: f64,
+    /// u.
+    pub voltage_v: f64,
+    /// Bits of [`flags`].
+    pub flags: u32,
+}
+
+/// Bits of [`AxisSignals::flags`].
+pub mod flags {
+    /// Speed set-point clamped.
+    pub const SPEED_CLAMP: u32 = 1;
+    /// Current limit reached.
+    pub const CURRENT_LIMIT: u32 = 2;
+    /// Voltage limit reached.
+    pub const VOLTAGE_LIMIT: u32 = 4;
+    /// The axis sticks.
+    pub const STUCK: u32 = 8;
+}
+
+/// How a drive starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Start {
+    /// Balanced: integrators hold the axis under gravity exactly still.
+    #[default]
+    Held,
+    /// Brake released with empty integrators.
+    Cold,
+}

@@ -1,0 +1,7 @@
+//! JointPath -> TimeLaw: the speed along the path, so that every limit of every axis holds.
+//!
+//! In: [`JointPath`](crate::kinematics::JointPath)s in order. Out: [`PlannedPiece`]s in order, each fixed for good once it is handed out. Sees at most
+//! `look_ahead.blocks` motion blocks beyond the one that it fixes. Does not sample.
+
+mod wire;
+pub use wire::*;

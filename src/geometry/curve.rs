@@ -1,0 +1,4 @@
+//! placeholder
+/// One curve.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Curve {}

@@ -1,0 +1,7 @@
+//! TimeLaw -> Setpoint: positions of all axes at k * t_s, by exact evaluation of the curve.
+//!
+//! In: [`PlannedPiece`](crate::feed::PlannedPiece)s in order. Out: a [`Setpoint`] per cycle. A cycle may cross many pieces; the rest of a cycle is carried
+//! into the next piece, so that no block is rounded to whole cycles.
+
+mod wire;
+pub use wire::*;

@@ -1,0 +1,54 @@
+//! The wire out of the interpolator.
+
+use crate::base::{PerAxis, Tick};
+use crate::feed::Limit;
+use crate::program::BlockRef;
+
+/// Set-point of one axis; `lu` is mm or rad.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct AxisSetpoint {
+    /// Position.
+    pub position_lu: f64,
+    /// Analytic velocity at the tick.
+    pub velocity_lu_s: f64,
+    /// Analytic acceleration at the tick.
+    pub acceleration_lu_s2: f64,
+    /// Analytic jerk at the tick.
+    pub jerk_lu_s3: f64,
+}
+
+/// What the interpolator sends in one cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setpoint {
+    /// When.
+    pub tick: Tick,
+    /// All axes.
+    pub axes: PerAxis<AxisSetpoint>,
+    /// The path at that instant.
+    pub path: PathSample,
+    /// FFWON in force.
+    pub feedforward_active: bool,
+}
+
+/// State of the path at a set-point: the topic `/path`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathSample {
+    /// NC block.
+    pub block: BlockRef,
+    /// Path length of the linear axes since the start of the program.
+    pub path_length_mm: f64,
+    /// Path feed of the linear axes (of the rotary axes, rad/s, where no linear axis moves).
+    pub feed_lu_s: f64,
+    /// Programmed feed; `None` for rapids and standstill.
+    pub programmed_feed_lu_s: Option<f64>,
+    /// Path acceleration.
+    pub acceleration_lu_s2: f64,
+    /// Path jerk.
+    pub jerk_lu_s3: f64,
+    /// What holds the motion back.
+    pub limit: Limit,
+    /// Motion blocks in the look-ahead.
+    pub buffered_blocks: u32,
+    /// True where only rotary axes move: the `_lu` above are rad.
+    pub rotary_only: bool,
+}

@@ -1,0 +1,7 @@
+//! Contour -> JointPath: part space to joint space, and the pose of the tool for a posture of the axes.
+//!
+//! In: [`ContourPiece`]s. Out: [`JointPath`]: q(s) with q', q'', q''' of every axis. Without an active transformation (TRAORI is a
+//! later issue) machine space is part space, axis by axis. Does not know speed.
+
+mod wire;
+pub use wire::*;

@@ -1,0 +1,6 @@
+//! Moves -> Contour: joins moves to a path, and rounds corners as the path mode says.
+//!
+//! In: [`Move`](crate::interpreter::Move)s in order. Out: [`ContourPiece`]s in order, streamed. Does not know speed.
+
+mod wire;
+pub use wire::*;
