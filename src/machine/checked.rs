@@ -42,6 +42,16 @@ impl Machine {
         self.axis_ids().find(|id| self.axis(*id).name.eq_ignore_ascii_case(name))
     }
 
+    /// Axes whose drive holds representative values: every figure that depends on one of them says so.
+    pub fn representative_drives(&self) -> impl Iterator<Item = AxisId> + '_ {
+        self.axis_ids().filter(|id| self.axis(*id).drive.as_ref().is_some_and(|drive| !drive.identified))
+    }
+
+    /// Axes without a drive: actual = set-point.
+    pub fn ideal_axes(&self) -> impl Iterator<Item = AxisId> + '_ {
+        self.axis_ids().filter(|id| self.axis(*id).drive.is_none())
+    }
+
     /// True for every linear axis: the mask of the path length in mm.
     pub fn linear_mask(&self) -> PerAxis<bool> {
         let mut mask = PerAxis::splat(false);
@@ -249,6 +259,8 @@ pub struct Axis {
     pub machine_axis: Option<String>,
     /// Velocity, acceleration, jerk.
     pub limits: AxisLimits,
+    /// `[axes.*.dynamics.*]`: limits of DYNNORM .. DYNFINISH where they differ. Read and checked, not acted on yet.
+    pub dynamics: AxisDynamics,
     /// e of the corner rule.
     pub follow_up_tolerance_lu: f64,
     /// Software limits, if any.
@@ -272,6 +284,53 @@ pub struct AxisLimits {
     pub jerk_max_lu_s3: f64,
     /// Jtb, MD32432: jerk inside a blend.
     pub transition_jerk_max_lu_s3: f64,
+}
+
+/// G group 59: what an axis may do in a kind of machining.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DynamicsMode {
+    /// DYNNORM, `[axes.*.dynamics.norm]`.
+    Norm,
+    /// DYNPOS, `[axes.*.dynamics.position]`.
+    Position,
+    /// DYNROUGH, `[axes.*.dynamics.rough]`.
+    Rough,
+    /// DYNSEMIFIN, `[axes.*.dynamics.semifinish]`.
+    SemiFinish,
+    /// DYNFINISH, `[axes.*.dynamics.finish]`.
+    Finish,
+}
+
+impl DynamicsMode {
+    /// All five, in the order of the machine-data index.
+    pub const ALL: [Self; 5] = [Self::Norm, Self::Position, Self::Rough, Self::SemiFinish, Self::Finish];
+
+    /// Its name in a machine file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Norm => "norm",
+            Self::Position => "position",
+            Self::Rough => "rough",
+            Self::SemiFinish => "semifinish",
+            Self::Finish => "finish",
+        }
+    }
+}
+
+/// The five dynamics sets of an axis; the default is none, so that the limits of the axis hold in every mode.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct AxisDynamics([Option<AxisLimits>; 5]);
+
+impl AxisDynamics {
+    /// The limits given for a mode; `None`: those of the axis hold.
+    pub fn get(&self, mode: DynamicsMode) -> Option<&AxisLimits> {
+        self.0[mode as usize].as_ref()
+    }
+
+    /// Gives a mode limits of its own.
+    pub fn set(&mut self, mode: DynamicsMode, limits: AxisLimits) {
+        self.0[mode as usize] = Some(limits);
+    }
 }
 
 /// `[axes.*.drive]` with motor, mechanics and encoder; symbols of models/drive.md section 2 in brackets.

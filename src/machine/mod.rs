@@ -1,7 +1,32 @@
 //! The machine: from the file as written to a checked [`Machine`] in internal units.
 //!
-//! In: TOML text (`file`), `--set KEY=VALUE` overrides. Out: [`Machine`], immutable, every value inside its range.
-//! Does not know programs, paths or recordings.
+//! In: TOML text, `--set KEY=VALUE` overrides. Out: [`Loaded`]: the [`Machine`], immutable, every value inside its range, and the file
+//! as used. Every key is a row of the catalogue ([`tables`]), from which the checks, the JSON Schema ([`schema`]) and the user's table
+//! of keys are made. Does not know programs, paths or recordings.
 
+mod axis;
+mod axis_catalogue;
+mod catalogue;
 mod checked;
+mod choices;
+mod clock;
+mod control;
+mod document;
+mod drive;
+mod keys;
+mod later;
+mod load;
+mod overrides;
+mod periods;
+mod schema;
+mod section;
+mod shipped;
+
+pub use catalogue::tables;
 pub use checked::*;
+pub use choices::Choice;
+pub use keys::{Absent, Accepts, Key, Range, TableKeys};
+pub use later::unsupported;
+pub use load::{LoadError, Loaded, load, parse};
+pub use schema::schema;
+pub use shipped::{DEFAULT_MACHINE, shipped};

@@ -1,0 +1,57 @@
+//! Values of the file format that this version reads and checks but cannot run.
+//!
+//! In: a checked [`Machine`]. Out: one finding a value, by name, with what to write instead. `parse` shows them as warnings, `run` and
+//! `time` refuse with them as errors: nothing is ever replaced in silence.
+
+use super::checked::{ArcLimits, BlendLaw, BlendLimits, BlendShape, CurvatureJump, Machine, PathMode, TimeLawKind};
+use super::choices::Choice;
+use crate::base::diagnostics::Diagnostic;
+
+/// A value that is not available yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Later {
+    pub table: &'static str,
+    pub key: &'static str,
+    pub word: &'static str,
+    pub instead: &'static str,
+}
+
+/// What a machine asks for that is not available yet, as errors.
+pub fn unsupported(machine: &Machine) -> Vec<Diagnostic> {
+    later_values(machine).iter().map(Later::error).collect()
+}
+
+pub(super) fn later_values(machine: &Machine) -> Vec<Later> {
+    let (feed, smoothing) = (&machine.feed, &machine.smoothing);
+    let later_mode = matches!(feed.default_path_mode, PathMode::G643 | PathMode::G644 | PathMode::G645);
+    let rows = [
+        (feed.time_law == TimeLawKind::Continuous, "feed", "time_law", feed.time_law.word(), "seven-phase"),
+        (later_mode, "feed", "default_path_mode", feed.default_path_mode.word(), "G642"),
+        (feed.curvature_jump == CurvatureJump::Printed, "feed", "curvature_jump", feed.curvature_jump.word(), "signed"),
+        (feed.arc_limits == ArcLimits::Printed, "feed", "arc_limits", feed.arc_limits.word(), "worst"),
+        (smoothing.blend_law == BlendLaw::Published, "smoothing", "blend_law", smoothing.blend_law.word(), "limits"),
+        (smoothing.shape == BlendShape::Quintic, "smoothing", "shape", smoothing.shape.word(), "hermite3"),
+        (smoothing.limits == BlendLimits::Path, "smoothing", "limits", smoothing.limits.word(), "axis"),
+    ];
+    let asked_for = rows.into_iter().filter(|(asked, ..)| *asked);
+    asked_for.map(|(_, table, key, word, instead)| Later { table, key, word, instead }).collect()
+}
+
+impl Later {
+    fn message(&self) -> String {
+        format!("{}.{} = \"{}\" is not available yet", self.table, self.key, self.word)
+    }
+
+    fn help(&self) -> String {
+        let Self { table, key, instead, .. } = self;
+        format!("write \"{instead}\", or give --set {table}.{key}={instead}")
+    }
+
+    fn error(&self) -> Diagnostic {
+        Diagnostic::error("M0201", self.message()).help(self.help())
+    }
+
+    pub fn warning(&self) -> Diagnostic {
+        Diagnostic::warning("M0201", format!("{}: `run` and `time` refuse it", self.message())).help(self.help())
+    }
+}
