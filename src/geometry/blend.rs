@@ -139,7 +139,7 @@ impl HermiteBlend {
 
     /// The shape at u, clamped to [0, 1]; u counts over the whole blend, trimmed or not.
     pub fn shape(&self, u_ratio: f64) -> BlendPoint {
-        let plane = self.shape.at(2.0 * u_ratio.max(0.0).min(1.0) - 1.0);
+        let plane = self.shape.at(w_from_u(u_ratio));
         let t = self.transition_length_mm;
         // d/du = 2 d/dw; sigma'' = (S''.S'' + S'.S''' - sigma'²) / sigma, models/local-smoothing.md section 2.
         let PlanePoint { sigma_ratio: sigma_w, first: d1, second: d2, third: d3, .. } = plane;
@@ -164,7 +164,7 @@ impl HermiteBlend {
 
     /// Arc length from the start of this curve at u; negative or beyond the length outside a trimmed part.
     pub fn arc_length_at_u_lu(&self, u_ratio: f64) -> f64 {
-        let w = 2.0 * u_ratio.max(0.0).min(1.0) - 1.0;
+        let w = w_from_u(u_ratio);
         (self.shape.half_length() + self.shape.length_to(w)) * self.transition_length_mm - self.offset_mm
     }
 
@@ -342,6 +342,11 @@ impl PlanePoint {
         let turning = cross(self.first, self.second) * dot(self.first, self.second) / squared;
         (cross(self.first, self.third) - 3.0 * turning) / (squared * squared)
     }
+}
+
+/// w of u clamped to [0, 1]; a NaN counts as 0.
+fn w_from_u(u_ratio: f64) -> f64 {
+    if u_ratio > 0.0 { 2.0 * u_ratio.min(1.0) - 1.0 } else { -1.0 }
 }
 
 /// Cubic through two points (x, y) with slopes, at `at_ratio`.
