@@ -2,5 +2,13 @@
 //!
 //! In: points and shapes. Out: [`Curve`]. Does not know speed or axes' limits.
 
+mod arc;
+mod blend;
 mod curve;
-pub use curve::Curve;
+mod line;
+mod quadrature;
+
+pub use arc::Arc;
+pub use blend::{BlendPoint, HermiteBlend};
+pub use curve::{Curve, CurveState, DISPLACEMENT_MIN_LU};
+pub use line::Line;
