@@ -72,7 +72,7 @@ fn blend_has_the_closed_forms_of_the_model() {
             near(start.curvature_per_mm, (6.0 - 2.0 * alpha) * angle.sin() / (alpha * alpha * t), "k(0)");
             let mid = 2.0 * alpha * half.sin() / (t * (3.0 - alpha / 2.0).powi(2) * half.cos().powi(2));
             near(middle.curvature_per_mm, mid, "k(1/2)");
-            near(middle.curvature_slope_per_mm2, 0.0, "dk/ds(1/2)");
+            near(middle.curvature_slope_per_mm_mm, 0.0, "dk/ds(1/2)");
             // T = 8 eps / ((4 - alpha)|V - U|) makes the mid-point deviation eps.
             let epsilon = t * (4.0 - alpha) * 2.0 * half.sin() / 8.0;
             let at_middle = blend.at(blend.length_lu() / 2.0).position.0;
@@ -161,7 +161,7 @@ fn shape_derivatives_agree_with_finite_differences() {
             let second = central(before.sigma_first_mm, after.sigma_first_mm);
             close(here.sigma_second_mm, second, 1e-5 * (1.0 + second.abs()), "sigma''");
             let slope = central(before.curvature_per_mm, after.curvature_per_mm) / here.sigma_mm;
-            close(here.curvature_slope_per_mm2, slope, 1e-5 * (1.0 + slope.abs()), "dk/ds");
+            close(here.curvature_slope_per_mm_mm, slope, 1e-5 * (1.0 + slope.abs()), "dk/ds");
             let turn = (after.tangent - before.tangent) * (0.5 / h) * (1.0 / here.sigma_mm);
             close((turn - here.normal * here.curvature_per_mm).norm(), 0.0, 1e-5 * (1.0 + turn.norm()), "dT/ds = k N");
         }
@@ -173,10 +173,10 @@ fn curvature_slope_peaks_where_the_model_says() {
     // models/local-smoothing.md section 3: peak over its value at u = 0, and where.
     for (degrees, ratio, place) in [(10.0, 2.2, 0.26), (30.0, 2.5, 0.29), (60.0, 4.1, 0.32), (90.0, 10.8, 0.37)] {
         let blend = blend(f64::to_radians(degrees), 1.0, 2.5);
-        let at_start = blend.shape(0.0).curvature_slope_per_mm2.abs();
+        let at_start = blend.shape(0.0).curvature_slope_per_mm_mm.abs();
         let (peak, u) = (0..=1000)
             .map(|i| i as f64 / 2000.0)
-            .map(|u| (blend.shape(u).curvature_slope_per_mm2.abs(), u))
+            .map(|u| (blend.shape(u).curvature_slope_per_mm_mm.abs(), u))
             .fold((0.0, 0.0), |best, here| if here.0 > best.0 { here } else { best });
         close(peak / at_start, ratio, 0.06, &format!("ratio at {degrees} deg"));
         close(u, place, 0.02, &format!("place at {degrees} deg"));

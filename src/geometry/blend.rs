@@ -56,7 +56,7 @@ pub struct BlendPoint {
     /// k, positive towards the inside of the corner (negative beyond the inflection that alpha > 3 has near the ends).
     pub curvature_per_mm: f64,
     /// dk/ds.
-    pub curvature_slope_per_mm2: f64,
+    pub curvature_slope_per_mm_mm: f64,
     /// Unit tangent.
     pub tangent: AxisVector,
     /// Unit normal towards the inside of the corner.
@@ -138,8 +138,8 @@ impl HermiteBlend {
     }
 
     /// The shape at u, clamped to [0, 1]; u counts over the whole blend, trimmed or not.
-    pub fn shape(&self, u_ratio: f64) -> BlendPoint {
-        let plane = self.shape.at(w_from_u(u_ratio));
+    pub fn shape(&self, u: f64) -> BlendPoint {
+        let plane = self.shape.at(w_from_u(u));
         let t = self.transition_length_mm;
         // d/du = 2 d/dw; sigma'' = (S''.S'' + S'.S''' - sigma'²) / sigma, models/local-smoothing.md section 2.
         let PlanePoint { sigma_ratio: sigma_w, first: d1, second: d2, third: d3, .. } = plane;
@@ -151,7 +151,7 @@ impl HermiteBlend {
             sigma_first_mm: 4.0 * t * sigma_ww,
             sigma_second_mm: 8.0 * t * sigma_www,
             curvature_per_mm: plane.curvature() / t,
-            curvature_slope_per_mm2: plane.curvature_slope() / (t * t),
+            curvature_slope_per_mm_mm: plane.curvature_slope() / (t * t),
             tangent: self.in_space(tangent),
             normal: self.in_space([-tangent[1], tangent[0]]),
         }
@@ -163,8 +163,8 @@ impl HermiteBlend {
     }
 
     /// Arc length from the start of this curve at u; negative or beyond the length outside a trimmed part.
-    pub fn arc_length_at_u_lu(&self, u_ratio: f64) -> f64 {
-        let w = w_from_u(u_ratio);
+    pub fn arc_length_at_u_lu(&self, u: f64) -> f64 {
+        let w = w_from_u(u);
         (self.shape.half_length() + self.shape.length_to(w)) * self.transition_length_mm - self.offset_mm
     }
 

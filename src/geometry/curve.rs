@@ -92,6 +92,9 @@ impl Curve {
         // `max` before `min`: a NaN becomes an end of the curve.
         let start_lu = start_lu.max(0.0).min(length_lu);
         let end_lu = end_lu.max(start_lu).min(length_lu);
+        if start_lu == 0.0 && end_lu == length_lu {
+            return self.clone();
+        }
         match self {
             Self::Line(line) => Self::Line(line.shortened(start_lu, length_lu - end_lu)),
             Self::Arc(arc) => Self::Arc(arc.trimmed(start_lu, end_lu)),

@@ -31,16 +31,22 @@ pub struct Kinematics {
     head: Vec<Joint>,
 }
 
+/// Unit vector, dimensionless.
+pub type Direction = [f64; 3];
+
+/// Unit quaternion x, y, z, w, dimensionless.
+pub type Quaternion = [f64; 4];
+
 /// Pose of the tool in the part frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolPose {
     /// Tool tip.
     pub position_mm: [f64; 3],
     /// Unit vector from the tip towards the spindle.
-    pub axis: [f64; 3],
+    pub axis: Direction,
     /// Rotation that takes the tool's own frame (+Z = axis) into the part frame. Continuous in the angles, so that it changes sign
     /// with every turn.
-    pub orientation_quaternion_xyzw: [f64; 4],
+    pub orientation_quaternion_xyzw: Quaternion,
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -7,5 +7,5 @@ mod chain;
 mod joint_path;
 mod wire;
 
-pub use chain::{Kinematics, ToolPose};
+pub use chain::{Direction, Kinematics, Quaternion, ToolPose};
 pub use wire::*;

@@ -2,5 +2,10 @@
 //!
 //! In: [`Move`](crate::interpreter::Move)s in order. Out: [`ContourPiece`]s in order, streamed. Does not know speed.
 
+mod corner;
+mod smoother;
+mod unrounded;
 mod wire;
+
+pub use smoother::Smoother;
 pub use wire::*;

@@ -1,0 +1,215 @@
+//! Joins moves to a contour, one at a time.
+//!
+//! In: [`Move`]s in order, pushed. Out: [`ContourPiece`]s in order: every motion block once (cut where blends take its ends), the
+//! blends, the waits. One motion block is held back, because the next one decides how it ends. Events of blocks without motion go
+//! to the next block; where none follows, to a wait at the end.
+//!
+//! Moves without displacement make no piece and no junction: their events and their count go to the next block. Displacement below
+//! [`DISPLACEMENT_MIN_LU`] is none; it is not lost, because the next block starts where the contour is.
+//!
+//! Does not decide how a corner is passed: that is `corner`.
+
+use super::corner::{Junction, Rules, Side};
+use super::unrounded::Unrounded;
+use super::{ContourPiece, PieceKind};
+use crate::base::{Diagnostic, PartPoint};
+use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
+use crate::interpreter::{Event, Feed, Modes, Move, MoveKind};
+use crate::machine::{Machine, PathMode};
+use crate::program::BlockRef;
+
+/// Moves in, contour out.
+#[derive(Clone, Debug)]
+pub struct Smoother {
+    rules: Rules,
+    position: PartPoint,
+    held: Option<Held>,
+    /// Blocks without motion that wait for the next piece; `block`, `feed` and `modes` are those of the last of them, for the
+    /// case that no piece follows.
+    carried: Option<Head>,
+    unrounded: Unrounded,
+}
+
+/// The motion block whose end is not decided yet.
+#[derive(Clone, Debug)]
+struct Held {
+    curve: Curve,
+    /// Taken from its start by a blend.
+    head_lu: f64,
+    head: Head,
+}
+
+/// What a piece says about its block.
+#[derive(Clone, Debug)]
+struct Head {
+    block: BlockRef,
+    feed: Feed,
+    modes: Modes,
+    events: Vec<Event>,
+    blocks_begun: u32,
+}
+
+impl Smoother {
+    /// At the machine's home posture, at rest.
+    pub fn new(machine: &Machine) -> Self {
+        let mut position = PartPoint::default();
+        for axis in machine.axis_ids() {
+            position.0[axis] = machine.axis(axis).home_lu;
+        }
+        Self { rules: Rules::new(machine), position, held: None, carried: None, unrounded: Unrounded::default() }
+    }
+
+    /// Takes the next move; hands over the pieces that it decides.
+    pub fn push(&mut self, next: Move, out: &mut impl FnMut(ContourPiece)) {
+        self.unrounded.watch(&next.events);
+        let linear = self.rules.linear();
+        match next.kind {
+            MoveKind::Rapid | MoveKind::Line => {
+                let line = Line::new(self.position, next.end, linear);
+                self.push_motion(next, Curve::Line(line), out);
+            }
+            MoveKind::Arc(geometry) => {
+                let arc = Arc::new(self.position, next.end, &geometry, linear);
+                self.push_motion(next, Curve::Arc(arc), out);
+            }
+            MoveKind::Dwell { time_s } => self.push_wait(next, time_s, out),
+            MoveKind::Function { stops: true } => self.push_wait(next, 0.0, out),
+            MoveKind::Function { stops: false } => self.carry(next, 0),
+        }
+    }
+
+    /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
+    pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        self.rest(out);
+        if let Some(carried) = self.carried.take() {
+            out(self.wait(carried, 0.0));
+        }
+    }
+
+    /// Findings since the last call.
+    pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
+        self.unrounded.take()
+    }
+
+    fn push_motion(&mut self, next: Move, curve: Curve, out: &mut impl FnMut(ContourPiece)) {
+        let length_lu = curve.length_lu();
+        if !(length_lu.is_finite() && length_lu >= DISPLACEMENT_MIN_LU) {
+            if next.modes.path_mode == PathMode::ExactStop {
+                self.rest(out);
+            }
+            self.carry(next, 1);
+            return;
+        }
+        self.position = next.end;
+        let mut held = Held { curve, head_lu: 0.0, head: self.head(next, 1) };
+        if let Some(before) = self.held.take() {
+            self.join(before, &mut held, out);
+        }
+        self.held = Some(held);
+    }
+
+    /// Decides the end of `before` and the start of `after`.
+    fn join(&mut self, before: Held, after: &mut Held, out: &mut impl FnMut(ContourPiece)) {
+        let free_lu = before.curve.length_lu() - before.head_lu;
+        match self.rules.junction(&before.side(), &after.side(), free_lu) {
+            Junction::Pass => out(before.whole(false)),
+            Junction::Stop => out(before.whole(true)),
+            Junction::Unrounded(reason) => {
+                self.unrounded.report(reason, before.head.block);
+                out(before.whole(false));
+            }
+            Junction::Blend(blend, corner) => {
+                let t = corner.transition_length_mm;
+                after.head_lu = t;
+                let Head { block, feed, modes, .. } = before.head;
+                let mut head =
+                    Head { block, feed: lower(feed, after.head.feed), modes, events: Vec::new(), blocks_begun: 0 };
+                let blend = if free_lu - t > 0.0 {
+                    out(before.part(t, false));
+                    blend
+                } else {
+                    // The blends take the whole block: this one begins where the last one ended, and with it the block.
+                    let start = before.shortened(0.0).start();
+                    head.events = before.head.events;
+                    head.blocks_begun = before.head.blocks_begun;
+                    blend.starting_at(start)
+                };
+                out(head.piece(PieceKind::Blend(Curve::Blend(blend), corner), false));
+            }
+        }
+    }
+
+    /// Ends the motion here.
+    fn rest(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        if let Some(held) = self.held.take() {
+            out(held.whole(true));
+        }
+    }
+
+    fn push_wait(&mut self, next: Move, time_s: f64, out: &mut impl FnMut(ContourPiece)) {
+        self.rest(out);
+        let head = self.head(next, 0);
+        out(self.wait(head, time_s));
+    }
+
+    fn wait(&self, head: Head, time_s: f64) -> ContourPiece {
+        head.piece(PieceKind::Wait { time_s, at: self.position }, true)
+    }
+
+    fn carry(&mut self, next: Move, blocks: u32) {
+        let head = self.head(next, blocks);
+        // A block that neither moves nor says anything leaves no trace.
+        self.carried = (head.blocks_begun > 0 || !head.events.is_empty()).then_some(head);
+    }
+
+    /// What the next piece says: its own, after what was carried to it.
+    fn head(&mut self, next: Move, blocks: u32) -> Head {
+        let Move { block, feed, modes, mut events, .. } = next;
+        let mut blocks_begun = blocks;
+        if let Some(mut carried) = self.carried.take() {
+            blocks_begun += carried.blocks_begun;
+            carried.events.append(&mut events);
+            events = carried.events;
+        }
+        Head { block, feed, modes, events, blocks_begun }
+    }
+}
+
+impl Held {
+    fn side(&self) -> Side<'_> {
+        Side { curve: &self.curve, feed: self.head.feed, modes: &self.head.modes }
+    }
+
+    /// The block up to its programmed end.
+    fn whole(self, stop_at_end: bool) -> ContourPiece {
+        self.part(0.0, stop_at_end)
+    }
+
+    /// The block without what blends take of it.
+    fn part(self, tail_lu: f64, stop_at_end: bool) -> ContourPiece {
+        let curve = self.shortened(tail_lu);
+        self.head.piece(PieceKind::Block(curve), stop_at_end)
+    }
+
+    fn shortened(&self, tail_lu: f64) -> Curve {
+        match &self.curve {
+            Curve::Line(line) => Curve::Line(line.shortened(self.head_lu, tail_lu)),
+            curve => curve.trimmed(self.head_lu, curve.length_lu() - tail_lu),
+        }
+    }
+}
+
+impl Head {
+    fn piece(self, kind: PieceKind, stop_at_end: bool) -> ContourPiece {
+        let Self { block, feed, modes, events, blocks_begun } = self;
+        ContourPiece { block, kind, feed, modes, events, blocks_begun, stop_at_end }
+    }
+}
+
+/// The lower of two feeds.
+fn lower(first: Feed, second: Feed) -> Feed {
+    match (first, second) {
+        (Feed::Rapid, other) | (other, Feed::Rapid) => other,
+        (Feed::Path { feed_lu_s: a }, Feed::Path { feed_lu_s: b }) => Feed::Path { feed_lu_s: a.min(b) },
+    }
+}
