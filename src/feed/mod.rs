@@ -3,5 +3,13 @@
 //! In: [`JointPath`](crate::kinematics::JointPath)s in order. Out: [`PlannedPiece`]s in order, each fixed for good once it is handed out. Sees at most
 //! `look_ahead.blocks` motion blocks beyond the one that it fixes. Does not sample.
 
+mod blend_limits;
+mod junction;
+mod limits;
+mod planner;
+pub mod profile;
+pub mod ramp;
 mod wire;
+
+pub use planner::Planner;
 pub use wire::*;

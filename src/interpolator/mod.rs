@@ -3,5 +3,10 @@
 //! In: [`PlannedPiece`](crate::feed::PlannedPiece)s in order. Out: a [`Setpoint`] per cycle. A cycle may cross many pieces; the rest of a cycle is carried
 //! into the next piece, so that no block is rounded to whole cycles.
 
+mod fine;
+mod sampler;
 mod wire;
+
+pub use fine::FineInterpolator;
+pub use sampler::{Begun, Interpolator};
 pub use wire::*;

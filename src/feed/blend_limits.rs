@@ -1,0 +1,237 @@
+//! What the axes allow inside a corner blend (models/local-smoothing.md sections 2 and 3) [Essid 2019].
+//!
+//! In: a [`HermiteBlend`], the limits of the axes and the shares R_A and R_J. Out: [`PieceLimits`]: the highest constant feed through
+//! the blend, and the tangential acceleration and jerk that are left to change the speed where it is lower than that.
+//!
+//! With the unit tangent T, the unit normal N and the curvature k an axis sees `v² k N` of acceleration and
+//! `v³ k' N - v³ k² T` of jerk at constant feed. Under `blend_law = "entry"` the feed obeys (c) and (e) of section 2 at u = 0 only,
+//! as published; under `"limits"` everywhere, and (d) as well. The speed may change (with a = 0 at both ends) while it is at most
+//! [`RAMP_SPEED_RATIO`] of the feed that is safe everywhere: what the cubes leave of (d) and (e) goes to `j T` and
+//! `3 v a k N`. Without that a chain of blends that touch (short segments) would have one speed from end to end.
+//!
+//! The step of `v² k N` at the ends of the blend (it is not zero for the published curve) is not limited: section 3 has no such
+//! rule, and none is added here.
+
+use super::LimitKind;
+use super::limits::{AxisRules, Demand, PieceLimits};
+use super::profile::SpeedCap;
+use crate::base::{AxisId, AxisVector};
+use crate::geometry::{BlendPoint, HermiteBlend};
+use crate::machine::BlendLaw;
+
+/// Share of the safe feed up to which the speed may change inside a blend: half of the jerk is then left.
+const RAMP_SPEED_RATIO: f64 = 0.8;
+
+/// Distance of samples, in a measure that crowds towards the middle as the curve does.
+const SAMPLE_STEP: f64 = 0.1;
+
+/// A sharper bend is sampled like this one (c of the geometry): below it the feed is next to nothing anyway.
+const SHARPEST_COSINE: f64 = 1e-6;
+
+/// What the samples may miss of a greatest demand; what the search between two samples may miss. Tests compare with a far finer
+/// sampling.
+const SAMPLE_RESERVE_RATIO: f64 = 1.05;
+const SEARCH_RESERVE_RATIO: f64 = 1.0 + 1e-4;
+
+/// Rounds of the golden-section search between two samples; each leaves 0.618 of the interval.
+const SEARCH_ROUNDS: usize = 14;
+
+/// Demands per power of v and a that are watched along the blend, with their letters in section 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Watch {
+    /// (c): v² k |N|.
+    Radial,
+    /// (e) at constant feed: v³ |k'| |N|.
+    Normal,
+    /// (d) at constant feed: v³ k² |T|.
+    Tangential,
+    /// (e): v a 3 k |N|.
+    Coupled,
+}
+
+const WATCHED: [Watch; 4] = [Watch::Radial, Watch::Normal, Watch::Tangential, Watch::Coupled];
+
+/// The place of the greatest demand among samples.
+#[derive(Clone, Copy)]
+struct Worst {
+    demand: Demand,
+    /// Measure along the blend, -1 to 1.
+    place: f64,
+}
+
+/// Limits of a blend.
+pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+    let scan = Scan::new(rules, blend);
+    let worst = scan.sample();
+    let (ra, rj) = (rules.radial_acceleration_share, rules.radial_jerk_share);
+    let velocity = rules.largest(|axis, limits| scan.tangent(axis) / limits.velocity_max_lu_s);
+    let acceleration = rules.largest(|axis, limits| scan.tangent(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
+    let jerk = rules.largest(|axis, limits| scan.tangent(axis) / ((1.0 - rj) * limits.transition_jerk_max_lu_s3));
+    let coupled = worst[Watch::Coupled as usize].demand;
+    let safe = scan.safe_feed(&worst);
+    let geometric = match rules.blend_law {
+        BlendLaw::Limits => safe,
+        // "published" has the same entry; its step law is refused with the machine file.
+        BlendLaw::Entry | BlendLaw::Published => scan.entry_feed(),
+    };
+    let driven = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
+    let cap = driven.min(geometric);
+    let ramp_cap = cap.min(SpeedCap { velocity_lu_s: RAMP_SPEED_RATIO * safe.velocity_lu_s, limit: safe.limit });
+    let v = ramp_cap.velocity_lu_s;
+    // At the safe feed (d) and (e) use all of their shares at most; at v the cube of the ratio of it.
+    let left = 1.0 - (v / safe.velocity_lu_s).powi(3);
+    let over_left = |demand: Demand, factor: f64| Demand { ratio: demand.ratio * factor / left, ..demand };
+    let jerk = over_left(jerk, 1.0);
+    let coupled = over_left(coupled, v * SAMPLE_RESERVE_RATIO);
+    if !jerk_limited || coupled.ratio <= acceleration.ratio {
+        return PieceLimits::new(cap, ramp_cap, acceleration, jerk, jerk_limited);
+    }
+    let mut limits = PieceLimits::new(cap, ramp_cap, coupled, jerk, jerk_limited);
+    limits.bounds.acceleration = coupled.limit(LimitKind::RadialJerk);
+    limits
+}
+
+/// Demands along one blend.
+struct Scan<'a> {
+    rules: &'a AxisRules,
+    blend: &'a HermiteBlend,
+    /// Directions of T and N in the middle: the blend is symmetric about them.
+    along: AxisVector,
+    inward: AxisVector,
+    half_angle_rad: f64,
+    /// w = b sinh(place * range), w = 2u - 1.
+    width: f64,
+    range: f64,
+}
+
+impl<'a> Scan<'a> {
+    fn new(rules: &'a AxisRules, blend: &'a HermiteBlend) -> Self {
+        let middle = blend.shape(0.5);
+        // |S'| has its nearest zeros at w = ± i b with b about 1.4 cos(theta/2): that is how narrow the bend is.
+        let half_angle_rad = blend.angle_rad() / 2.0;
+        let width = 1.4 * half_angle_rad.cos().max(SHARPEST_COSINE);
+        let range = (1.0 / width).asinh();
+        Self { rules, blend, along: middle.tangent, inward: middle.normal, half_angle_rad, width, range }
+    }
+
+    /// Largest |T| of an axis: T turns from half the angle before its middle direction to half the angle after it.
+    fn tangent(&self, axis: AxisId) -> f64 {
+        let (along, inward) = (self.along[axis].abs(), self.inward[axis].abs());
+        let (sin, cos) = self.half_angle_rad.sin_cos();
+        if inward * cos <= along * sin { along.hypot(inward) } else { along * cos + inward * sin }
+    }
+
+    /// The blend at a place from -1 to 1.
+    fn point(&self, place: f64) -> BlendPoint {
+        let w = self.width * (place * self.range).sinh();
+        self.blend.shape(0.5 * (1.0 + w))
+    }
+
+    /// The greatest demands of all samples.
+    fn sample(&self) -> [Worst; WATCHED.len()] {
+        let mut worst = WATCHED.map(|_| Worst { demand: Demand { ratio: 0.0, axis: AxisId::new(0) }, place: 0.0 });
+        let steps = (self.range / SAMPLE_STEP).ceil().max(4.0) as u32;
+        let mut look = |place: f64, point: &BlendPoint| {
+            for (watch, worst) in WATCHED.into_iter().zip(&mut worst) {
+                let demand = self.demand(watch, point);
+                if demand.ratio > worst.demand.ratio {
+                    *worst = Worst { demand, place };
+                }
+            }
+        };
+        for i in 0..=steps {
+            let place = f64::from(i) / f64::from(steps);
+            let point = self.point(place);
+            look(-place, &self.mirrored(&point));
+            look(place, &point);
+        }
+        worst
+    }
+
+    /// The point as far before the middle as `point` is after it.
+    fn mirrored(&self, point: &BlendPoint) -> BlendPoint {
+        let (t, n) = (point.tangent, point.normal);
+        let tangent = self.along * (2.0 * t.dot(&self.along)) - t;
+        let normal = self.inward * (2.0 * n.dot(&self.inward)) - n;
+        BlendPoint { tangent, normal, ..*point }
+    }
+
+    fn demand(&self, watch: Watch, point: &BlendPoint) -> Demand {
+        let (ra, rj) = (self.rules.radial_acceleration_share, self.rules.radial_jerk_share);
+        let k = point.curvature_per_mm.abs();
+        let k_slope = point.curvature_slope_per_mm2.abs();
+        self.rules.largest(|axis, limits| {
+            let (t, n) = (point.tangent[axis].abs(), point.normal[axis].abs());
+            let (a_max, j_max) = (limits.acceleration_max_lu_s2, limits.transition_jerk_max_lu_s3);
+            match watch {
+                Watch::Radial => k * n / (ra * a_max),
+                Watch::Normal => k_slope * n / (rj * j_max),
+                Watch::Tangential => k * k * t / ((1.0 - rj) * j_max),
+                Watch::Coupled => 3.0 * k * n / (rj * j_max),
+            }
+        })
+    }
+
+    /// Section 3: (c) and (e) at u = 0.
+    fn entry_feed(&self) -> SpeedCap {
+        let entry = self.blend.shape(0.0);
+        let cap = |watch| geometric_cap(watch, self.demand(watch, &entry));
+        cap(Watch::Radial).min(cap(Watch::Normal))
+    }
+
+    /// The highest constant feed at which (c), (d) and (e) hold all along.
+    fn safe_feed(&self, worst: &[Worst; WATCHED.len()]) -> SpeedCap {
+        let geometric = [Watch::Radial, Watch::Normal, Watch::Tangential];
+        let sampled = geometric.map(|watch| geometric_cap(watch, worst[watch as usize].demand));
+        let lowest_lu_s = sampled.iter().fold(f64::INFINITY, |low, cap| low.min(cap.velocity_lu_s));
+        let mut safe: Option<SpeedCap> = None;
+        for (watch, sampled) in geometric.into_iter().zip(sampled) {
+            // One that the samples put higher than their error cannot be the lowest.
+            let cap = if sampled.velocity_lu_s <= lowest_lu_s * SAMPLE_RESERVE_RATIO {
+                geometric_cap(watch, self.searched(watch, worst[watch as usize]))
+            } else {
+                sampled
+            };
+            safe = Some(safe.map_or(cap, |safe| safe.min(cap)));
+        }
+        safe.unwrap_or(sampled[0])
+    }
+
+    /// The greatest demand next to the worst sample, by golden section, with the reserve for what that misses.
+    fn searched(&self, watch: Watch, worst: Worst) -> Demand {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let step = SAMPLE_STEP / self.range;
+        let (mut low, mut high) = ((worst.place - step).max(-1.0), (worst.place + step).min(1.0));
+        let mut greatest = worst.demand;
+        let mut look = |place: f64| {
+            let demand = self.demand(watch, &self.point(place));
+            if demand.ratio > greatest.ratio {
+                greatest = demand;
+            }
+            demand.ratio
+        };
+        let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+        let (mut at_a, mut at_b) = (look(a), look(b));
+        for _ in 0..SEARCH_ROUNDS {
+            if at_a > at_b {
+                (high, b, at_b) = (b, a, at_a);
+                a = high - GOLDEN * (high - low);
+                at_a = look(a);
+            } else {
+                (low, a, at_a) = (a, b, at_b);
+                b = low + GOLDEN * (high - low);
+                at_b = look(b);
+            }
+        }
+        Demand { ratio: greatest.ratio * SEARCH_RESERVE_RATIO, ..greatest }
+    }
+}
+
+/// The feed at which a geometric demand reaches its limit.
+fn geometric_cap(watch: Watch, demand: Demand) -> SpeedCap {
+    match watch {
+        Watch::Radial => demand.cap(LimitKind::RadialAcceleration, 2.0),
+        Watch::Tangential => demand.cap(LimitKind::TransitionJerk, 3.0),
+        _ => demand.cap(LimitKind::RadialJerk, 3.0),
+    }
+}

@@ -1,0 +1,345 @@
+//! What the axes allow on one piece: its highest speed, its tangential acceleration and jerk, and which axis sets each.
+//!
+//! In: the curve of a piece with its derivatives, its feed, the limits of the axes ([`AxisRules`]). Out: [`PieceLimits`]. With
+//! speed v along the path an axis sees the velocity `q' v`, the acceleration `q'' v² + q' a` and the jerk
+//! `q''' v³ + 3 q'' v a + q' j`: for every axis the sums stay inside its limits wherever v, a and j stay inside those found here.
+//! Does not look at neighbours: what a junction allows is [`junction`](super::junction)'s.
+
+use super::blend_limits;
+use super::profile::{Bounds, SpeedCap};
+use super::ramp::Dynamics;
+use super::{Limit, LimitKind};
+use crate::base::AxisId;
+use crate::geometry::{Arc, Curve, CurveState};
+use crate::interpreter::Feed;
+use crate::kinematics::JointState;
+use crate::machine::{
+    AccelerationMode, ArcLimits, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine,
+};
+use crate::smoothing::ContourPiece;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// The jerk that is left on an arc is split in these many parts between its two uses.
+const JERK_SHARES: u32 = 16;
+
+/// Everything of the machine that speed depends on.
+#[derive(Clone, Debug)]
+pub(super) struct AxisRules {
+    /// Limits of every axis, in order.
+    pub axes: Vec<AxisLimits>,
+    /// Step of velocity that each axis may make at a corner.
+    pub corner_steps_lu_s: Vec<f64>,
+    /// R_A.
+    pub radial_acceleration_share: f64,
+    /// R_J.
+    pub radial_jerk_share: f64,
+    /// Feed inside a blend.
+    pub blend_law: BlendLaw,
+    /// Directions that bound an arc.
+    pub arc_limits: ArcLimits,
+    /// How a change of curvature is measured.
+    pub curvature_jump: CurvatureJump,
+    /// t_s.
+    pub setpoint_period_s: f64,
+}
+
+/// Largest of a demand per axis, in shares of what the axis allows, and the axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Demand {
+    /// Demand over limit.
+    pub ratio: f64,
+    /// Whose it is.
+    pub axis: AxisId,
+}
+
+/// Limits of a piece that moves.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PieceLimits {
+    /// Highest speed anywhere on the piece, alone.
+    pub cap: SpeedCap,
+    /// Up to here the speed may change; above it must be the same all along (blends only).
+    pub ramp_cap: SpeedCap,
+    /// Tangential acceleration and jerk and what sets them.
+    pub bounds: Bounds,
+}
+
+/// The ends of a piece that moves, as its neighbours see them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ends {
+    /// Where it begins.
+    pub start: JointState,
+    /// Where it ends.
+    pub end: JointState,
+    /// A blend: its change of curvature at the ends is there by construction.
+    pub blend: bool,
+    /// No linear axis moves: s is in rad.
+    pub rotary_only: bool,
+}
+
+impl AxisRules {
+    pub(super) fn new(machine: &Machine) -> Self {
+        let setpoint_period_s = machine.cycle.time_base.setpoint_period_s();
+        let FeedSettings { corner_rule, overload_ratio, arc_limits, curvature_jump, .. } = machine.feed;
+        let corner_step = |axis: &crate::machine::Axis| {
+            let a = axis.limits.acceleration_max_lu_s2;
+            match corner_rule {
+                // models/feed-prediction-and-surface.md section 2 [Lavernhe 2008].
+                CornerRule::FollowUp => (8.0 * a * axis.follow_up_tolerance_lu).sqrt(),
+                CornerRule::Overload => overload_ratio * a * setpoint_period_s,
+            }
+        };
+        Self {
+            axes: machine.axes.iter().map(|axis| axis.limits).collect(),
+            corner_steps_lu_s: machine.axes.iter().map(corner_step).collect(),
+            radial_acceleration_share: machine.smoothing.radial_acceleration_share,
+            radial_jerk_share: machine.smoothing.radial_jerk_share,
+            blend_law: machine.smoothing.blend_law,
+            arc_limits,
+            curvature_jump,
+            setpoint_period_s,
+        }
+    }
+
+    /// The axis for which `ratio(axis, its limits)` is largest, the first of equal ones.
+    pub(super) fn largest(&self, ratio: impl Fn(AxisId, &AxisLimits) -> f64) -> Demand {
+        let mut largest = Demand { ratio: 0.0, axis: AxisId::new(0) };
+        for (axis, limits) in AxisId::first(self.axes.len()).zip(&self.axes) {
+            let ratio = ratio(axis, limits);
+            if ratio > largest.ratio {
+                largest = Demand { ratio, axis };
+            }
+        }
+        largest
+    }
+
+    /// Limits of a piece on its curve.
+    pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
+        let feed = feed_cap(piece.feed);
+        let jerk_limited = piece.modes.acceleration_mode == AccelerationMode::Soft;
+        match curve {
+            Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
+            Curve::Arc(arc) => match self.arc_limits {
+                ArcLimits::Worst => self.arc(arc, feed, jerk_limited),
+                ArcLimits::Printed => self.arc_as_printed(arc, feed, jerk_limited),
+            },
+            Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
+        }
+    }
+
+    /// A line: every axis sees its share of v, a and j.
+    fn line(&self, state: &JointState, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+        let share = |axis: AxisId| state.first[axis].abs();
+        let velocity = self.largest(|axis, limits| share(axis) / limits.velocity_max_lu_s);
+        let acceleration = self.largest(|axis, limits| share(axis) / limits.acceleration_max_lu_s2);
+        let jerk = self.largest(|axis, limits| share(axis) / limits.jerk_max_lu_s3);
+        let cap = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
+        PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
+    }
+
+    /// An arc or helix: the worst direction met on it (models/arcs.md section 4), with the radial shares of models/local-smoothing.md
+    /// section 2, so that the sums over tangent and normal hold and not only each term.
+    fn arc(&self, arc: &Arc, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+        let worst = WorstOnArc::new(arc);
+        let (ra, rj) = (self.radial_acceleration_share, self.radial_jerk_share);
+        let velocity = self.largest(|axis, limits| worst.first(axis) / limits.velocity_max_lu_s);
+        let radial = self.largest(|axis, limits| worst.second(axis) / (ra * limits.acceleration_max_lu_s2));
+        let turning = self.largest(|axis, limits| worst.third(axis) / (rj * limits.jerk_max_lu_s3));
+        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
+        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2.0));
+        if jerk_limited {
+            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3.0));
+        }
+        let acceleration =
+            self.largest(|axis, limits| worst.first(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
+        if !jerk_limited {
+            return PieceLimits::new(cap, cap, acceleration, acceleration, jerk_limited);
+        }
+        let left =
+            |axis: AxisId, limits: &AxisLimits| limits.jerk_max_lu_s3 - cap.velocity_lu_s.powi(3) * worst.third(axis);
+        self.share_jerk(&worst, cap, acceleration, left)
+    }
+
+    /// Splits the jerk that turning leaves between `3 v a |q''|` and `j |q'|`: among some splits that one which reaches the cap
+    /// from rest in the shortest time. `left` is positive for every axis: turning takes R_J of the jerk at most.
+    fn share_jerk(
+        &self,
+        worst: &WorstOnArc,
+        cap: SpeedCap,
+        acceleration: Demand,
+        left: impl Fn(AxisId, &AxisLimits) -> f64,
+    ) -> PieceLimits {
+        let v = cap.velocity_lu_s;
+        let coupled = self.largest(|axis, limits| 3.0 * v * worst.second(axis) / left(axis, limits));
+        let candidate = |share: u32| {
+            let x = f64::from(share) / f64::from(JERK_SHARES);
+            // Lowest acceleration, so highest demand, of the two.
+            let a = acceleration.ratio.max(coupled.ratio / x).recip();
+            let jerk = self
+                .largest(|axis, limits| worst.first(axis) / (left(axis, limits) - 3.0 * v * a * worst.second(axis)));
+            let mut limits = PieceLimits::new(cap, cap, Demand { ratio: 1.0 / a, ..acceleration }, jerk, true);
+            if coupled.ratio / x > acceleration.ratio {
+                limits.bounds.acceleration = coupled.limit(LimitKind::Jerk);
+            }
+            (limits.bounds.dynamics.ramp(0.0, v).duration_s(), limits)
+        };
+        let (mut least_s, mut best) = candidate(1);
+        for share in 2..JERK_SHARES {
+            let (time_s, limits) = candidate(share);
+            if time_s < least_s {
+                (least_s, best) = (time_s, limits);
+            }
+        }
+        best
+    }
+
+    /// The rule as printed, for comparison: the acceleration of the direction of the centre at the entry stands for both
+    /// tangential and normal acceleration, and nothing is shared (models/arcs.md section 4) [Gassara 2013].
+    fn arc_as_printed(&self, arc: &Arc, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+        let worst = WorstOnArc::new(arc);
+        let (sin, cos) = arc.angle_start_rad().sin_cos();
+        let [first, second] = arc.plane();
+        let entry = |axis: AxisId| match axis {
+            axis if axis == first => cos.abs(),
+            axis if axis == second => sin.abs(),
+            axis => worst.first(axis),
+        };
+        let velocity = self.largest(|axis, limits| worst.first(axis) / limits.velocity_max_lu_s);
+        let acceleration = self.largest(|axis, limits| entry(axis) / limits.acceleration_max_lu_s2);
+        let jerk = self.largest(|axis, limits| worst.first(axis) / limits.jerk_max_lu_s3);
+        let k = arc.curvature_per_mm();
+        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
+        let radial = Demand { ratio: acceleration.ratio * k, ..acceleration };
+        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2.0));
+        if jerk_limited {
+            let turning = Demand { ratio: jerk.ratio * k * k, ..jerk };
+            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3.0));
+        }
+        PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
+    }
+}
+
+impl Demand {
+    /// The speed at which a demand that goes with its `power` reaches the limit. An axis without demand does not bind.
+    pub(super) fn cap(&self, kind: LimitKind, power: f64) -> SpeedCap {
+        let limit = self.limit(kind);
+        let velocity_lu_s = match power {
+            2.0 => 1.0 / self.ratio.sqrt(),
+            3.0 => 1.0 / self.ratio.cbrt(),
+            _ => 1.0 / self.ratio,
+        };
+        SpeedCap { velocity_lu_s, limit }
+    }
+
+    pub(super) fn limit(&self, kind: LimitKind) -> Limit {
+        Limit { kind, axis: Some(self.axis) }
+    }
+}
+
+impl PieceLimits {
+    /// `acceleration` and `jerk` are demands per unit of a and j.
+    pub(super) fn new(
+        cap: SpeedCap,
+        ramp_cap: SpeedCap,
+        acceleration: Demand,
+        jerk: Demand,
+        jerk_limited: bool,
+    ) -> Self {
+        let dynamics = Dynamics {
+            acceleration_lu_s2: 1.0 / acceleration.ratio,
+            jerk_lu_s3: jerk_limited.then_some(1.0 / jerk.ratio),
+        };
+        let bounds = Bounds {
+            cruise: ramp_cap,
+            dynamics,
+            acceleration: acceleration.limit(LimitKind::Acceleration),
+            jerk: jerk.limit(LimitKind::Jerk),
+        };
+        Self { cap, ramp_cap, bounds }
+    }
+
+    /// Highest speed at one end of `length_lu` if it is `from` at the other, and what sets it.
+    pub(super) fn reach(&self, from: SpeedCap, length_lu: f64) -> SpeedCap {
+        if self.ramp_cap.velocity_lu_s <= from.velocity_lu_s {
+            return from;
+        }
+        let velocity_lu_s = self.bounds.dynamics.reachable(from.velocity_lu_s, length_lu);
+        let limit = self.ramp_limit(from.velocity_lu_s, velocity_lu_s);
+        SpeedCap { velocity_lu_s, limit }.min(self.ramp_cap)
+    }
+
+    /// What bounds the quickest ramp from one speed to another: the axis whose acceleration is reached, else that of the jerk.
+    fn ramp_limit(&self, from_lu_s: f64, to_lu_s: f64) -> Limit {
+        if self.bounds.dynamics.ramp(from_lu_s, to_lu_s).hold_time_s > 0.0 {
+            self.bounds.acceleration
+        } else {
+            self.bounds.jerk
+        }
+    }
+}
+
+/// Programmed feed as a cap; a rapid has none.
+fn feed_cap(feed: Feed) -> SpeedCap {
+    let velocity_lu_s = match feed {
+        Feed::Rapid => f64::INFINITY,
+        Feed::Path { feed_lu_s } => feed_lu_s,
+    };
+    SpeedCap { velocity_lu_s, limit: Limit { kind: LimitKind::Feed, axis: None } }
+}
+
+/// Largest |q'|, |q''| and |q'''| of each axis over an arc: axis-parallel directions between its ends included.
+struct WorstOnArc {
+    /// |cos| of the polar angle, its largest; |sin| likewise.
+    cos: f64,
+    sin: f64,
+    state: CurveState,
+    plane: [AxisId; 2],
+    radius_mm: f64,
+    turn_rate_per_mm: f64,
+}
+
+impl WorstOnArc {
+    fn new(arc: &Arc) -> Self {
+        let (a, b) = (arc.angle_start_rad(), arc.angle_end_rad());
+        let (low, high) = (a.min(b), a.max(b));
+        // |cos| is 1 at multiples of pi, |sin| a quarter turn further.
+        let meets = |offset_rad: f64| ((low - offset_rad) / PI).ceil() * PI + offset_rad <= high;
+        let cos = if meets(0.0) { 1.0 } else { a.cos().abs().max(b.cos().abs()) };
+        let sin = if meets(FRAC_PI_2) { 1.0 } else { a.sin().abs().max(b.sin().abs()) };
+        Self {
+            cos,
+            sin,
+            state: arc.at(0.0),
+            plane: arc.plane(),
+            radius_mm: arc.radius_mm().abs(),
+            turn_rate_per_mm: arc.turn_rate_per_mm().abs(),
+        }
+    }
+
+    /// Largest share of the axis in the tangent (`along`) or in the normal.
+    fn in_plane(&self, axis: AxisId, along: bool) -> f64 {
+        let [first, second] = self.plane;
+        if axis == first {
+            if along { self.sin } else { self.cos }
+        } else if axis == second {
+            if along { self.cos } else { self.sin }
+        } else {
+            0.0
+        }
+    }
+
+    fn first(&self, axis: AxisId) -> f64 {
+        if self.plane.contains(&axis) {
+            self.radius_mm * self.turn_rate_per_mm * self.in_plane(axis, true)
+        } else {
+            self.state.first[axis].abs()
+        }
+    }
+
+    fn second(&self, axis: AxisId) -> f64 {
+        self.radius_mm * self.turn_rate_per_mm.powi(2) * self.in_plane(axis, false)
+    }
+
+    fn third(&self, axis: AxisId) -> f64 {
+        self.radius_mm * self.turn_rate_per_mm.powi(3) * self.in_plane(axis, true)
+    }
+}

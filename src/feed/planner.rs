@@ -1,0 +1,328 @@
+//! The look-ahead: speeds at all junctions of a window, and the law of its first piece.
+//!
+//! In: [`JointPath`]s in order. Out: [`PlannedPiece`]s in order. The window holds the piece at hand and at most `look_ahead_blocks`
+//! motion blocks beyond it, whatever was pushed; at its end the path must be able to rest. A backward pass finds for every junction
+//! the highest speed from which that is possible; it runs from the newest piece towards the first and ends where a junction keeps its
+//! speed, so that its cost is that of the braking distance and not of the window. More path can only raise these speeds: what was
+//! fixed stays possible. A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
+//! Does not sample, and does not know axes: `limits` and `junction` do.
+
+use super::junction::{self, FREE, STOP};
+use super::limits::{AxisRules, Ends, PieceLimits};
+use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
+use super::{Limit, LimitKind, PlannedPiece, TimeLaw};
+use crate::base::Diagnostic;
+use crate::kinematics::JointPath;
+use crate::machine::Machine;
+use crate::smoothing::PieceKind;
+use std::collections::VecDeque;
+
+/// Plans speeds over a window of the path.
+#[derive(Clone, Debug)]
+pub struct Planner {
+    rules: AxisRules,
+    look_ahead_blocks: u32,
+    /// The window, then pieces that wait to enter it.
+    entries: VecDeque<Entry>,
+    /// Entries in the window.
+    admitted: usize,
+    /// Motion blocks in the window beyond its first piece.
+    blocks_beyond: u32,
+    /// Places in the window, after the start of its first piece, where the path rests.
+    rests: usize,
+    /// The next pieces would make the window hold too many blocks.
+    full: bool,
+    finished: bool,
+    /// Entries from here on have changed since the backward pass.
+    changed_from: usize,
+    /// Speed at the start of the first piece.
+    entry: SpeedCap,
+    /// Ends of the last piece pushed that moves, unless the path rests after it.
+    last: Option<Ends>,
+    /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
+    half_blend_lu: f64,
+    warnings: Vec<Diagnostic>,
+}
+
+/// A piece in the window or before it.
+#[derive(Clone, Debug)]
+struct Entry {
+    path: JointPath,
+    motion: Motion,
+    /// What the junction at its start allows.
+    corner: SpeedCap,
+    /// The path rests at its end, whatever follows.
+    rests_after: bool,
+    /// Backward pass: highest speed at its start.
+    entry: SpeedCap,
+}
+
+/// How a piece moves.
+#[derive(Clone, Debug)]
+enum Motion {
+    /// Along a curve.
+    Moves {
+        limits: PieceLimits,
+        length_lu: f64,
+        /// The block's own share of the path, halves of its blends included, which must take one cycle at least; `None`: a blend.
+        block_length_lu: Option<f64>,
+    },
+    /// Stands still for a time.
+    Waits { time_s: f64 },
+    /// Takes neither way nor time: speed passes through it.
+    Nothing,
+}
+
+impl Planner {
+    /// An empty window on a path that begins at rest.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            rules: AxisRules::new(machine),
+            look_ahead_blocks: u32::try_from(machine.look_ahead_blocks).unwrap_or(u32::MAX),
+            entries: VecDeque::new(),
+            admitted: 0,
+            blocks_beyond: 0,
+            rests: 0,
+            full: false,
+            finished: false,
+            changed_from: 0,
+            entry: STOP,
+            last: None,
+            half_blend_lu: 0.0,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// The next piece of the path.
+    pub fn push(&mut self, path: JointPath) {
+        let contour = &path.contour;
+        let mut rests_after = contour.stop_at_end;
+        let mut corner = FREE;
+        let motion = match &contour.kind {
+            PieceKind::Block(curve) | PieceKind::Blend(curve, _) if curve.length_lu() > 0.0 => {
+                let length_lu = curve.length_lu();
+                let blend = matches!(contour.kind, PieceKind::Blend(..));
+                let (start, end) = (path.at(0.0), path.at(length_lu));
+                let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
+                corner = self.last.map_or(STOP, |before| junction::cap(&self.rules, &before, &ends));
+                self.last = Some(ends);
+                let limits = self.rules.piece(contour, curve, &ends);
+                Motion::Moves { limits, length_lu, block_length_lu: (!blend).then_some(length_lu) }
+            }
+            PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
+                (corner, rests_after) = (STOP, true);
+                Motion::Waits { time_s: *time_s }
+            }
+            _ => Motion::Nothing,
+        };
+        let motion = self.checked(motion, &path);
+        if rests_after {
+            self.last = None;
+        }
+        self.entries.push_back(Entry { path, motion, corner, rests_after, entry: STOP });
+    }
+
+    /// No more pieces: the path ends at rest.
+    pub fn finish(&mut self) {
+        self.finished = true;
+        // The end of the window may turn from a place where one must be able to stop into one where the path ends.
+        self.changed_from = self.changed_from.min(self.admitted.saturating_sub(1));
+    }
+
+    /// The next piece, fixed for good: as soon as the window beyond it is full, or a rest inside the window is known, or the path is
+    /// finished.
+    pub fn pop(&mut self) -> Option<PlannedPiece> {
+        self.admit();
+        if self.admitted == 0 || !(self.full || self.finished || self.rests > 0) {
+            return None;
+        }
+        self.plan_backward();
+        let ahead = if self.admitted > 1 { self.entries[1].entry } else { self.end_of_window() };
+        let front = self.entries.pop_front()?;
+        let (law, exit) = front.fixed(self.entry, ahead, self.rules.setpoint_period_s);
+        let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond };
+        self.entry = exit;
+        self.admitted -= 1;
+        self.changed_from = self.changed_from.saturating_sub(1);
+        self.full = false;
+        self.rests -= usize::from(front.rests_after);
+        if self.admitted > 0 {
+            let next = &self.entries[0];
+            self.blocks_beyond -= next.blocks();
+            self.rests -= usize::from(next.rests_before());
+        }
+        Some(piece)
+    }
+
+    /// What was found since the last call.
+    pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// A motion whose limits are numbers; else nothing, with a warning. Checked machines and programs do not give any.
+    fn checked(&mut self, motion: Motion, path: &JointPath) -> Motion {
+        let Motion::Moves { limits, length_lu, .. } = &motion else { return motion };
+        let Bounds { dynamics, .. } = &limits.bounds;
+        let numbers = [
+            *length_lu,
+            limits.cap.velocity_lu_s,
+            limits.ramp_cap.velocity_lu_s,
+            dynamics.acceleration_lu_s2,
+            dynamics.jerk_lu_s3.unwrap_or(1.0),
+        ];
+        if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
+            return motion;
+        }
+        let line = path.contour.block.line;
+        self.warnings.push(
+            Diagnostic::warning("F0001", format!("the motion of line {line} has no speed that every axis allows"))
+                .help("look for coordinates far outside the machine, or a curve with a cusp"),
+        );
+        Motion::Nothing
+    }
+
+    /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.
+    fn admit(&mut self) {
+        while !self.full && self.admitted < self.entries.len() {
+            let waiting = self.entries.range(self.admitted..);
+            let ends_group = |entry: &Entry| entry.blocks() > 0 || entry.rests_after;
+            let group = match waiting.clone().position(ends_group) {
+                Some(last) => last + 1,
+                None if self.finished => waiting.len(),
+                None => return,
+            };
+            let blocks: u32 = waiting.take(group).map(Entry::blocks).sum();
+            // Where several blocks begin at one place the window may hold more than its number, rather than none.
+            let first = self.blocks_beyond == 0 && self.look_ahead_blocks > 0;
+            self.full = self.admitted > 0 && !first && self.blocks_beyond + blocks > self.look_ahead_blocks;
+            if !self.full {
+                for _ in 0..group {
+                    self.admit_one();
+                }
+            }
+        }
+        self.full |= self.admitted > 0 && self.blocks_beyond >= self.look_ahead_blocks;
+    }
+
+    fn admit_one(&mut self) {
+        let index = self.admitted;
+        let half_before_lu = self.half_blend_lu;
+        // The piece before ended the window until now.
+        self.changed_from = self.changed_from.min(index.saturating_sub(1));
+        let entry = &mut self.entries[index];
+        self.rests += usize::from(entry.rests_after);
+        if index > 0 {
+            self.blocks_beyond += entry.blocks();
+            self.rests += usize::from(entry.rests_before());
+        }
+        self.admitted += 1;
+        match &mut entry.motion {
+            Motion::Moves { block_length_lu: Some(block_length_lu), .. } => {
+                *block_length_lu += half_before_lu;
+                self.half_blend_lu = 0.0;
+            }
+            Motion::Moves { length_lu, .. } => {
+                self.half_blend_lu = *length_lu / 2.0;
+                let half_lu = self.half_blend_lu;
+                if let Some(before) = index.checked_sub(1) {
+                    if let Motion::Moves { block_length_lu: Some(lu), .. } = &mut self.entries[before].motion {
+                        *lu += half_lu;
+                        self.changed_from = self.changed_from.min(before);
+                    }
+                }
+            }
+            Motion::Waits { .. } => self.half_blend_lu = 0.0,
+            Motion::Nothing => {}
+        }
+    }
+
+    /// Speed at the end of the window.
+    fn end_of_window(&self) -> SpeedCap {
+        let last = self.admitted.checked_sub(1).map(|last| &self.entries[last]);
+        let ends = self.finished && self.admitted == self.entries.len();
+        if ends || last.is_none_or(|last| last.rests_after) {
+            return STOP;
+        }
+        SpeedCap { velocity_lu_s: 0.0, limit: Limit { kind: LimitKind::LookAhead, axis: None } }
+    }
+
+    /// Highest speeds at the starts of all pieces but the first, from the end of the window.
+    fn plan_backward(&mut self) {
+        let mut exit = self.end_of_window();
+        for index in (1..self.admitted).rev() {
+            let entry = self.highest_entry(index, exit);
+            let kept = entry == self.entries[index].entry;
+            self.entries[index].entry = entry;
+            if kept && index <= self.changed_from {
+                break;
+            }
+            exit = entry;
+        }
+        self.changed_from = self.admitted;
+    }
+
+    /// Highest speed at the start of a piece if it is `exit` at its end.
+    fn highest_entry(&self, index: usize, exit: SpeedCap) -> SpeedCap {
+        let (before, piece) = (&self.entries[index - 1], &self.entries[index]);
+        let t_s = self.rules.setpoint_period_s;
+        let mut junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
+        if before.rests_after {
+            junction = junction.min(STOP);
+        }
+        junction.min(piece.motion.highest_entry(if piece.rests_after { STOP } else { exit }))
+    }
+}
+
+impl Entry {
+    fn blocks(&self) -> u32 {
+        self.path.contour.blocks_begun
+    }
+
+    fn rests_before(&self) -> bool {
+        self.corner.velocity_lu_s == 0.0
+    }
+
+    /// The law of this piece from the speed that it begins with to the highest one that it reaches and that is allowed `ahead`.
+    fn fixed(&self, entry: SpeedCap, ahead: SpeedCap, setpoint_period_s: f64) -> (TimeLaw, SpeedCap) {
+        let ahead = if self.rests_after { STOP } else { ahead };
+        match &self.motion {
+            Motion::Moves { limits, length_lu, .. } => {
+                let own = self.motion.cap(setpoint_period_s);
+                let reached = limits.reach(entry, *length_lu).min(own);
+                let exit = ahead.min(reached);
+                let bounds = Bounds { cruise: own.min(limits.ramp_cap), ..limits.bounds };
+                (seven_phases(&Stretch { length_lu: *length_lu, entry, exit }, &bounds), exit)
+            }
+            Motion::Waits { time_s } => (standstill(*time_s, Limit { kind: LimitKind::Dwell, axis: None }), STOP),
+            Motion::Nothing => (TimeLaw::new([]), ahead.min(entry)),
+        }
+    }
+}
+
+impl Motion {
+    /// Highest speed anywhere on the piece, alone.
+    fn cap(&self, setpoint_period_s: f64) -> SpeedCap {
+        match self {
+            Self::Moves { limits, block_length_lu: Some(block_length_lu), .. } => limits.cap.min(SpeedCap {
+                velocity_lu_s: block_length_lu / setpoint_period_s,
+                limit: Limit { kind: LimitKind::Cycle, axis: None },
+            }),
+            Self::Moves { limits, .. } => limits.cap,
+            Self::Waits { .. } => STOP,
+            Self::Nothing => FREE,
+        }
+    }
+
+    /// Highest speed at the start from which the piece can be left with `exit`.
+    fn highest_entry(&self, exit: SpeedCap) -> SpeedCap {
+        match self {
+            Self::Moves { limits, length_lu, .. } => {
+                let reached = limits.reach(exit, *length_lu);
+                // Where the path rests for good it is the braking that holds; any other junction passes on its own reason.
+                if exit == STOP { reached } else { SpeedCap { limit: exit.limit, ..reached } }
+            }
+            Self::Waits { .. } => STOP,
+            Self::Nothing => exit,
+        }
+    }
+}

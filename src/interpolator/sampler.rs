@@ -1,0 +1,224 @@
+//! The interpolator: samples the time laws at k * t_s.
+//!
+//! In: [`PlannedPiece`]s in order, taken when they begin. Out: a [`Setpoint`] per cycle, and what began in that cycle ([`Begun`]).
+//!
+//! Time inside a piece is what the cycle before left over when the piece began, plus whole cycles counted from there: no block is
+//! rounded to ticks and t_s is never summed up. Positions come from the curve, not from integration. Row 0 is the start posture;
+//! the last row is the end posture at rest, on the first tick at or after the end of the last law.
+//! Does not plan, and does not know what events mean.
+
+use super::{AxisSetpoint, PathSample, Setpoint};
+use crate::base::{PerAxis, TimeBase};
+use crate::feed::{Limit, LimitKind, PathState, PlannedPiece};
+use crate::interpreter::{Event, Feed};
+use crate::machine::Machine;
+use crate::program::BlockRef;
+use crate::smoothing::{Corner, PieceKind};
+
+/// A path that ends this share of its time after a tick ends on that tick: times are sums of rounded durations.
+const SAME_TIME_RATIO: f64 = 1e-9;
+
+/// Pieces that may begin in one cycle before the list of them has to grow.
+const BEGUN_USUAL: usize = 64;
+
+/// Samples planned pieces once a cycle.
+#[derive(Clone, Debug)]
+pub struct Interpolator {
+    time_base: TimeBase,
+    active: Option<Active>,
+    /// Taken to see whether the path goes on, but not begun yet.
+    next: Option<PlannedPiece>,
+    path_length_mm: f64,
+    begun: Vec<Begun>,
+    ended: bool,
+}
+
+/// A piece that began in the cycle that was sampled last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Begun {
+    /// Block that it belongs to.
+    pub block: BlockRef,
+    /// Motion blocks that begin with it.
+    pub blocks_begun: u32,
+    /// What is output at its start.
+    pub events: Vec<Event>,
+    /// The corner, where the piece is a blend.
+    pub corner: Option<Corner>,
+    /// Path speed at its start.
+    pub entry_feed_lu_s: f64,
+    /// Programmed feed; `None` for rapids and waits.
+    pub programmed_feed_lu_s: Option<f64>,
+    /// Path length; 0 for a wait.
+    pub length_lu: f64,
+    /// The `_lu` here are rad: no linear axis moves.
+    pub rotary_only: bool,
+    /// Time of its law.
+    pub duration_s: f64,
+    /// It began this long before the tick: at least 0, less than t_s (but for rounding).
+    pub before_tick_s: f64,
+    /// Path length of the linear axes where it begins.
+    pub path_length_mm: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Active {
+    piece: PlannedPiece,
+    length_lu: f64,
+    rotary_only: bool,
+    /// Tick number at or after its start, and how long after.
+    entry_k: u64,
+    carry_s: f64,
+    /// At its start.
+    path_length_mm: f64,
+}
+
+impl Interpolator {
+    /// Before the first cycle.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            time_base: machine.cycle.time_base,
+            active: None,
+            next: None,
+            path_length_mm: 0.0,
+            begun: Vec::with_capacity(BEGUN_USUAL),
+            ended: false,
+        }
+    }
+
+    /// Set-point `k`; to be called with k = 0, 1, 2, ... `next` gives the next planned piece, `None` once the path has ended, and is
+    /// called for every piece that begins at or before k * t_s. `None` after the set-point at the end of the path, or if there is no
+    /// path at all.
+    pub fn sample(&mut self, k: u64, next: &mut impl FnMut() -> Option<PlannedPiece>) -> Option<Setpoint> {
+        self.begun.clear();
+        if self.ended {
+            return None;
+        }
+        if self.active.is_none() {
+            let piece = next()?;
+            self.begin(piece, k, 0.0);
+        }
+        loop {
+            let active = self.active.as_ref()?;
+            let time_s =
+                active.carry_s + self.time_base.seconds((k - active.entry_k) * self.time_base.ticks_per_setpoint());
+            let left_s = active.piece.law.duration_s() - time_s;
+            if left_s > self.tolerance_s(k) {
+                return Some(self.setpoint(k, active, active.piece.law.at(time_s)));
+            }
+            // A next piece that begins up to the tolerance after the tick is only looked at, not begun.
+            let following = self.next.take().or_else(&mut *next);
+            match following {
+                Some(piece) if left_s > 0.0 => {
+                    self.next = Some(piece);
+                    let active = self.active.as_ref()?;
+                    return Some(self.setpoint(k, active, active.piece.law.at(time_s)));
+                }
+                Some(piece) => self.begin(piece, k, -left_s),
+                None => {
+                    self.ended = true;
+                    let active = self.active.as_ref()?;
+                    return Some(self.setpoint(k, active, active.at_end()));
+                }
+            }
+        }
+    }
+
+    /// What began in the cycle that was sampled last, in order. The caller may take the events out.
+    pub fn begun(&mut self) -> &mut [Begun] {
+        &mut self.begun
+    }
+
+    /// True once the set-point at the end of the path has been given.
+    pub fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// How close to a tick an end counts as on it.
+    fn tolerance_s(&self, k: u64) -> f64 {
+        SAME_TIME_RATIO * self.time_base.time_s(self.time_base.setpoint_tick(k))
+    }
+
+    fn begin(&mut self, mut piece: PlannedPiece, k: u64, carry_s: f64) {
+        if let Some(active) = &self.active {
+            if !active.rotary_only {
+                self.path_length_mm += active.length_lu;
+            }
+        }
+        let contour = &mut piece.path.contour;
+        let events = std::mem::take(&mut contour.events);
+        let corner = match &contour.kind {
+            PieceKind::Blend(_, corner) => Some(*corner),
+            PieceKind::Block(_) | PieceKind::Wait { .. } => None,
+        };
+        let rotary_only = contour.curve().is_some_and(crate::geometry::Curve::rotary_only);
+        let length_lu = contour.curve().map_or(0.0, crate::geometry::Curve::length_lu);
+        self.begun.push(Begun {
+            block: contour.block,
+            blocks_begun: contour.blocks_begun,
+            events,
+            corner,
+            entry_feed_lu_s: piece.law.at(0.0).velocity_lu_s,
+            programmed_feed_lu_s: programmed_feed_lu_s(&piece),
+            length_lu,
+            rotary_only,
+            duration_s: piece.law.duration_s(),
+            before_tick_s: carry_s,
+            path_length_mm: self.path_length_mm,
+        });
+        let path_length_mm = self.path_length_mm;
+        self.active = Some(Active { piece, length_lu, rotary_only, entry_k: k, carry_s, path_length_mm });
+    }
+
+    fn setpoint(&self, k: u64, active: &Active, state: PathState) -> Setpoint {
+        let s_lu = state.position_lu.clamp(0.0, active.length_lu);
+        // A law that ends at rest may end a rounding error below it.
+        let v = state.velocity_lu_s.max(0.0);
+        let (a, j) = (state.acceleration_lu_s2, state.jerk_lu_s3);
+        let q = active.piece.path.at(s_lu);
+        let velocity = q.first * v;
+        let acceleration = q.second * (v * v) + q.first * a;
+        let jerk = q.third * (v * v * v) + q.second * (3.0 * v * a) + q.first * j;
+        let axes = PerAxis::from_fn(|axis| AxisSetpoint {
+            position_lu: q.position.0[axis],
+            velocity_lu_s: velocity[axis],
+            acceleration_lu_s2: acceleration[axis],
+            jerk_lu_s3: jerk[axis],
+        });
+        let contour = &active.piece.path.contour;
+        let linear_mm = if active.rotary_only { 0.0 } else { s_lu };
+        Setpoint {
+            tick: self.time_base.setpoint_tick(k),
+            axes,
+            path: PathSample {
+                block: contour.block,
+                path_length_mm: active.path_length_mm + linear_mm,
+                feed_lu_s: v,
+                programmed_feed_lu_s: programmed_feed_lu_s(&active.piece),
+                acceleration_lu_s2: a,
+                jerk_lu_s3: j,
+                limit: state.limit,
+                buffered_blocks: active.piece.buffered_blocks,
+                rotary_only: active.rotary_only,
+            },
+            feedforward_active: contour.modes.feedforward_active,
+        }
+    }
+}
+
+impl Active {
+    /// The end of the path: exactly there, at rest.
+    fn at_end(&self) -> PathState {
+        let limit =
+            self.piece.law.phases().last().map_or(Limit { kind: LimitKind::Feed, axis: None }, |last| last.limit);
+        PathState { position_lu: self.length_lu, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
+    }
+}
+
+/// F of a piece that moves with one.
+fn programmed_feed_lu_s(piece: &PlannedPiece) -> Option<f64> {
+    let contour = &piece.path.contour;
+    match (&contour.kind, contour.feed) {
+        (PieceKind::Wait { .. }, _) | (_, Feed::Rapid) => None,
+        (_, Feed::Path { feed_lu_s }) => Some(feed_lu_s),
+    }
+}

@@ -1,0 +1,258 @@
+//! Machines, paths and random numbers for the tests of feed and interpolator.
+//!
+//! In: points and modes. Out: planned pieces and set-points, driven as the kernel drives them. Does not check anything.
+#![allow(dead_code)]
+
+use sollwert::base::{AxisId, AxisKind, PartPoint, PerAxis, TimeBase};
+use sollwert::feed::{PlannedPiece, Planner};
+use sollwert::interpolator::{Interpolator, Setpoint};
+use sollwert::interpreter::{ArcGeometry, Feed, Modes, Move, MoveKind};
+use sollwert::kinematics::{JointPath, Kinematics};
+use sollwert::machine::*;
+use sollwert::program::{BlockRef, ProgramId};
+use sollwert::smoothing::Smoother;
+
+/// The published machine of [Essid 2019, table 2]: 3 axes, 20 m/min, 1 m/s², 15 m/s³, transition jerk 10 m/s³, t_s = 1 ms.
+pub fn spinner() -> Machine {
+    let limits = AxisLimits {
+        velocity_max_lu_s: 20_000.0 / 60.0,
+        acceleration_max_lu_s2: 1000.0,
+        jerk_max_lu_s3: 15_000.0,
+        transition_jerk_max_lu_s3: 10_000.0,
+    };
+    let axis = |(i, name): (usize, &str)| Axis {
+        name: name.to_owned(),
+        kind: AxisKind::Linear,
+        index: i as u32 + 1,
+        machine_axis: None,
+        limits,
+        follow_up_tolerance_lu: 0.01,
+        travel_lu: None,
+        home_lu: 0.0,
+        modulo: false,
+        drive: None,
+    };
+    Machine {
+        name: "Spinner MVC 850".to_owned(),
+        control: "test".to_owned(),
+        cycle: Cycle {
+            time_base: TimeBase::new((1_000_000, 1), 4),
+            control_cycle_s: 0.008,
+            sampling_ratio: 0.125,
+            fine_interpolation: FineInterpolation::Cubic,
+        },
+        look_ahead_blocks: 8,
+        feed: FeedSettings {
+            time_law: TimeLawKind::SevenPhase,
+            default_path_mode: PathMode::G642,
+            default_acceleration_mode: AccelerationMode::Soft,
+            corner_rule: CornerRule::FollowUp,
+            overload_ratio: 1.2,
+            curvature_jump: CurvatureJump::Signed,
+            arc_limits: ArcLimits::Worst,
+        },
+        smoothing: SmoothingSettings {
+            alpha_ratio: 2.5,
+            tolerance_ratio: 0.8,
+            tolerance_reversal_ratio: 0.6,
+            contour_tolerance_mm: 0.1,
+            rounding_distance_mm: None,
+            radial_acceleration_share: 0.2,
+            radial_jerk_share: 0.2,
+            blend_law: BlendLaw::Limits,
+            shape: BlendShape::Hermite3,
+            limits: BlendLimits::Axis,
+        },
+        kinematics: KinematicsSettings::Cartesian,
+        axes: ["X", "Y", "Z"].into_iter().enumerate().map(axis).collect(),
+    }
+}
+
+/// The Spinner with a rotary axis A: 15 rpm, 0.83 rot/s², 5 rot/s³.
+pub fn with_rotary() -> Machine {
+    let mut machine = spinner();
+    let mut axis = machine.axes[0].clone();
+    axis.name = "A".to_owned();
+    axis.kind = AxisKind::Rotary;
+    axis.index = 4;
+    let turn = std::f64::consts::TAU;
+    axis.limits = AxisLimits {
+        velocity_max_lu_s: 15.0 / 60.0 * turn,
+        acceleration_max_lu_s2: 0.83 * turn,
+        jerk_max_lu_s3: 5.0 * turn,
+        transition_jerk_max_lu_s3: 5.0 * turn,
+    };
+    axis.follow_up_tolerance_lu = 1e-4;
+    machine.axes.push(axis);
+    machine
+}
+
+pub fn point(values: &[f64]) -> PartPoint {
+    PartPoint(PerAxis::from_fn(|axis| values.get(axis.index()).copied().unwrap_or(0.0)))
+}
+
+pub fn modes(path_mode: PathMode) -> Modes {
+    Modes {
+        path_mode,
+        contour_tolerance_mm: Some(0.1),
+        rounding_distance_mm: None,
+        acceleration_mode: AccelerationMode::Soft,
+        feedforward_active: true,
+    }
+}
+
+/// A program of moves from the machine's home.
+#[derive(Clone)]
+pub struct Program {
+    pub modes: Modes,
+    pub feed: Feed,
+    pub moves: Vec<Move>,
+}
+
+impl Program {
+    pub fn new(path_mode: PathMode, feed_mm_min: f64) -> Self {
+        Self { modes: modes(path_mode), feed: Feed::Path { feed_lu_s: feed_mm_min / 60.0 }, moves: Vec::new() }
+    }
+
+    pub fn push(&mut self, kind: MoveKind, end: PartPoint) {
+        let number = self.moves.len() as u64 + 1;
+        let block = BlockRef { program: ProgramId(0), line: number as u32, number };
+        let feed = if kind == MoveKind::Rapid { Feed::Rapid } else { self.feed };
+        self.moves.push(Move { block, kind, end, feed, modes: self.modes, events: Vec::new() });
+    }
+
+    pub fn end(&self) -> PartPoint {
+        self.moves.last().map_or_else(|| point(&[]), |last| last.end)
+    }
+
+    pub fn line(&mut self, values: &[f64]) {
+        self.push(MoveKind::Line, point(values));
+    }
+
+    pub fn rapid(&mut self, values: &[f64]) {
+        self.push(MoveKind::Rapid, point(values));
+    }
+
+    pub fn dwell(&mut self, time_s: f64) {
+        self.push(MoveKind::Dwell { time_s }, self.end());
+    }
+
+    /// Arc in XY about a centre, by a signed angle; Z moves along by `pitch_mm`.
+    pub fn arc(&mut self, centre_mm: [f64; 2], sweep_rad: f64, pitch_mm: f64) {
+        let start = self.end();
+        let (x, y) = (AxisId::new(0), AxisId::new(1));
+        let (dx, dy) = (start.0[x] - centre_mm[0], start.0[y] - centre_mm[1]);
+        let (sin, cos) = sweep_rad.sin_cos();
+        let mut end = start;
+        end.0[x] = centre_mm[0] + dx * cos - dy * sin;
+        end.0[y] = centre_mm[1] + dx * sin + dy * cos;
+        end.0[AxisId::new(2)] += pitch_mm;
+        let arc = ArcGeometry { plane: [x, y], centre_mm, radius_mm: dx.hypot(dy), sweep_rad };
+        self.push(MoveKind::Arc(arc), end);
+    }
+
+    pub fn polyline(path_mode: PathMode, feed_mm_min: f64, points: &[[f64; 2]]) -> Self {
+        let mut program = Self::new(path_mode, feed_mm_min);
+        for p in points {
+            program.line(p);
+        }
+        program
+    }
+
+    /// Path pieces, all at once.
+    pub fn paths(&self, machine: &Machine) -> Vec<JointPath> {
+        let mut smoother = Smoother::new(machine);
+        let kinematics = Kinematics::new(machine);
+        let mut paths = Vec::new();
+        for next in &self.moves {
+            smoother.push(next.clone(), &mut |piece| paths.push(kinematics.to_joint(piece)));
+        }
+        smoother.finish(&mut |piece| paths.push(kinematics.to_joint(piece)));
+        paths
+    }
+
+    /// Planned pieces; a path is handed over only when the planner asks for more.
+    pub fn planned(&self, machine: &Machine) -> Vec<PlannedPiece> {
+        plan(machine, self.paths(machine))
+    }
+
+    pub fn setpoints(&self, machine: &Machine) -> Vec<Setpoint> {
+        sample(machine, self.planned(machine))
+    }
+}
+
+pub fn plan(machine: &Machine, paths: Vec<JointPath>) -> Vec<PlannedPiece> {
+    let mut planner = Planner::new(machine);
+    let mut paths = paths.into_iter();
+    let mut planned = Vec::new();
+    loop {
+        while let Some(piece) = planner.pop() {
+            planned.push(piece);
+        }
+        match paths.next() {
+            Some(path) => planner.push(path),
+            None => break,
+        }
+    }
+    planner.finish();
+    while let Some(piece) = planner.pop() {
+        planned.push(piece);
+    }
+    assert!(planner.take_warnings().is_empty());
+    planned
+}
+
+pub fn sample(machine: &Machine, planned: Vec<PlannedPiece>) -> Vec<Setpoint> {
+    let mut interpolator = Interpolator::new(machine);
+    let mut planned = planned.into_iter();
+    let mut next = || planned.next();
+    (0..).map_while(|k| interpolator.sample(k, &mut next)).collect()
+}
+
+pub fn total_s(planned: &[PlannedPiece]) -> f64 {
+    planned.iter().map(|piece| piece.law.duration_s()).sum()
+}
+
+/// xorshift64*: the same numbers everywhere.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    pub fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Evenly over the orders of magnitude.
+    pub fn logarithmic(&mut self, low: f64, high: f64) -> f64 {
+        (self.between(low.ln(), high.ln())).exp()
+    }
+
+    /// A walk of `count` segments: long and short, turning sharply, reversing or hardly at all.
+    pub fn walk(&mut self, count: usize, shortest_mm: f64, longest_mm: f64) -> Vec<[f64; 2]> {
+        let (mut at, mut direction_rad) = ([0.0, 0.0], self.between(0.0, 6.3));
+        (0..count)
+            .map(|_| {
+                let length_mm = self.logarithmic(shortest_mm, longest_mm);
+                at = [at[0] + length_mm * direction_rad.cos(), at[1] + length_mm * direction_rad.sin()];
+                direction_rad += match (self.unit() * 5.0) as u32 {
+                    0 => self.between(-3.1, 3.1),
+                    1 => self.between(-1e-3, 1e-3),
+                    2 => std::f64::consts::FRAC_PI_2,
+                    3 => self.between(-0.3, 0.3),
+                    _ => 0.0,
+                };
+                at
+            })
+            .collect()
+    }
+}
