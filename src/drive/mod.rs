@@ -29,5 +29,4 @@ pub use axis_drive::{AxisDrive, DriveInput};
 pub use choice::Drive;
 pub use ideal::IdealDrive;
 pub use plant::{Piece, Plant, PlantState};
-pub use transition::Transition;
 pub use wire::*;

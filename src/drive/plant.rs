@@ -155,6 +155,11 @@ impl Plant {
         duration_s: f64,
         mut show: impl FnMut(Piece),
     ) -> PlantState {
+        if !self.has_dry_friction {
+            show(Piece { start: state, duration_s, dry_friction_n_m: Some(0.0) });
+            let excess = self.excess(state, voltage_v, gravity_n_m);
+            return Transition::over(&self.motor, &self.mechanics, duration_s).apply(state, excess);
+        }
         let kt = self.motor.torque_constant_n_m_per_a;
         let MechanicsData { coulomb_friction_n_m: tc, breakaway_friction_n_m: ts, .. } = self.mechanics;
         let mut remaining_s = duration_s;

@@ -23,7 +23,7 @@ const HALVINGS_MAX: u32 = 2200;
 
 /// Constant map over `duration_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transition {
+pub(super) struct Transition {
     duration_s: f64,
     /// F(h) with the columns divided by L and J.
     current_by_voltage_a_per_v: f64,
@@ -46,7 +46,7 @@ pub(super) struct Excess {
 
 impl Transition {
     /// The map over `duration_s`.
-    pub fn over(motor: &MotorData, mechanics: &MechanicsData, duration_s: f64) -> Self {
+    pub(super) fn over(motor: &MotorData, mechanics: &MechanicsData, duration_s: f64) -> Self {
         let (l, j) = (motor.inductance_h, mechanics.inertia_kg_m2);
         let a = [
             [-motor.resistance_ohm / l, -motor.back_emf_v_s_per_rad / l],
