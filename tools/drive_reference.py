@@ -179,11 +179,14 @@ def cases():
     # Reversals on a circle of 2 mm at 8 Hz.
     yield ("reversal", replace(MVC_X, kvff=1, dpos=1.2e-3, ktff=.5, Jff=.0085, dff=.3e-3),
            [2 * math.sin(math.tau * 8 * k * 1e-3) for k in range(161)], none, True, 4)
-    # Slow ramp with breakaway above Coulomb: stick-slip.
-    yield ("stick_slip", replace(MVC_Y, Ts=1.8, Kv=16.667),
-           [.4 * k * 1e-3 for k in range(401)], none, True, 10)
+    # Slow ramp with breakaway far above Coulomb: six slips.
+    yield ("stick_slip", replace(MVC_Y, Ts=3.6, Tn=.004),
+           [0.0 if k < 2 else .01 + .0002 * k for k in range(401)], none, True, 10)
+    # The same axis at a constant set-point: the integrator makes it hunt.
+    yield ("hunting", replace(MVC_Y, Ts=3.6, Tn=.004),
+           [0.0 if k < 2 else .01 for k in range(461)], none, True, 10)
     # A jump of 20 mm of a vertical axis: speed clamp, current and voltage limit; a load comes and goes.
-    yield ("saturation", replace(UCP_Z, umax=60, vmax=250, imax=20),
+    yield ("saturation", replace(UCP_Z, umax=35, vmax=250, imax=20),
            [0.0 if k < 5 else 20.0 for k in range(121)], lambda k: 3.0 if 70 <= k < 90 else 0.0, True, 3)
     # Tilting table, cold start, both encoders quantised, negative transmission.
     yield ("tilt", replace(UCP_A, r=-1 / 120, kvff=1, Ts=.9, qpos=2e-6, qmot=2e-4),
