@@ -1,0 +1,201 @@
+//! The cascade of one axis: the block diagram of models/drive.md section 1 as code, in the update order of section 4.
+//!
+//! In: one position set-point a position cycle. Out: [`AxisSignals`], every wire of the diagram. All controllers act without
+//! computing delay on the state sampled at the start of the tick. Does not check its data (`machine` does), nor the set-point
+//! against the limits of the axis: a set-point that is too fast saturates, is flagged, and recovers.
+
+use super::current_loop::{CurrentLoop, VoltageCommand};
+use super::encoder::{MotorEncoder, PositionEncoder};
+use super::feedforward::{Feedforward, Terms};
+use super::plant::{Plant, PlantState};
+use super::position_loop::{PositionLoop, SpeedCommand};
+use super::speed_loop::{SpeedLoop, TorqueCommand};
+use super::wire::{AxisSignals, Start, flags};
+use crate::base::TimeBase;
+use crate::machine::Axis;
+
+/// What a drive gets in one position cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveInput {
+    /// x_set.
+    pub position_setpoint_lu: f64,
+    /// Text: outside torque at the motor shaft, counted like gravity.
+    pub load_n_m: f64,
+    /// FFWON; `false` sets both feed-forward weights to 0 for this cycle.
+    pub feedforward_active: bool,
+}
+
+/// Drive, motor and mechanics of one axis. Holds all of its state: a clone is a snapshot.
+#[derive(Clone, Debug)]
+pub struct AxisDrive {
+    feedforward: Feedforward,
+    position_encoder: PositionEncoder,
+    position_loop: PositionLoop,
+    motor_encoder: MotorEncoder,
+    speed_loop: SpeedLoop,
+    current_loop: CurrentLoop,
+    plant: Plant,
+    state: PlantState,
+    /// r.
+    transmission_lu_per_rad: f64,
+    /// n_p = T_p / T_v.
+    speed_ticks: u32,
+    /// n_v = T_v / T_i.
+    current_ticks: u32,
+    /// Mean of the current over the last position cycle.
+    current_mean_a: f64,
+}
+
+/// All wires at one tick, by the box that drives them.
+struct Wires {
+    input: DriveInput,
+    terms: Terms,
+    measured_lu: f64,
+    speed: SpeedCommand,
+    torque: TorqueCommand,
+    gravity_n_m: f64,
+    voltage: VoltageCommand,
+}
+
+impl AxisDrive {
+    /// The drive of `axis`, standing at `position_lu` (the first set-point); `None` for an axis without drive data.
+    pub fn new(axis: &Axis, time_base: &TimeBase, start: Start, position_lu: f64) -> Option<Self> {
+        let data = axis.drive.as_ref()?;
+        let position_period_s = time_base.seconds(data.position_cycle_ticks);
+        let speed_period_s = time_base.seconds(data.speed_cycle_ticks);
+        let current_period_s = time_base.seconds(data.current_cycle_ticks);
+        let transmission_lu_per_rad = data.mechanics.transmission_lu_per_rad;
+        let plant = Plant::new(data, current_period_s);
+        let angle_rad = position_lu / transmission_lu_per_rad;
+        // Held: motor torque, both integrators and the current balance gravity. Cold: all of them are empty.
+        let torque_n_m = match start {
+            Start::Held => plant.gravity_n_m(angle_rad),
+            Start::Cold => 0.0,
+        };
+        let current_a = torque_n_m / data.motor.torque_constant_n_m_per_a;
+        Some(Self {
+            feedforward: Feedforward::new(data, position_period_s, position_lu),
+            position_encoder: PositionEncoder::new(data),
+            position_loop: PositionLoop::new(data),
+            motor_encoder: MotorEncoder::new(data, speed_period_s, angle_rad),
+            speed_loop: SpeedLoop::new(data, speed_period_s, torque_n_m),
+            current_loop: CurrentLoop::new(data, current_period_s, data.motor.resistance_ohm * current_a),
+            plant,
+            state: PlantState { current_a, speed_rad_s: 0.0, angle_rad },
+            transmission_lu_per_rad,
+            speed_ticks: whole_ratio(data.position_cycle_ticks, data.speed_cycle_ticks),
+            current_ticks: whole_ratio(data.speed_cycle_ticks, data.current_cycle_ticks),
+            current_mean_a: current_a,
+        })
+    }
+
+    /// One position cycle. Returns the signals at its first tick: the state before the plant step with the commands of that tick.
+    pub fn step(&mut self, input: DriveInput) -> AxisSignals {
+        let mut first = AxisSignals::default();
+        self.cycle(input, |tick, drive, wires| {
+            if tick == 0 {
+                first = drive.signals(wires);
+            }
+        });
+        first
+    }
+
+    /// One position cycle; `each` gets the number of the current tick within it, from 0, and the signals at that tick.
+    pub fn step_each(&mut self, input: DriveInput, mut each: impl FnMut(u32, &AxisSignals)) {
+        self.cycle(input, |tick, drive, wires| each(tick, &drive.signals(wires)));
+    }
+
+    /// The diagram, from left to right.
+    #[inline(always)]
+    fn cycle(&mut self, input: DriveInput, mut observe: impl FnMut(u32, &Self, &Wires)) {
+        let position_lu = self.transmission_lu_per_rad * self.state.angle_rad;
+        let measured_lu = self.position_encoder.measured_lu(position_lu);
+        let terms = self.feedforward.terms(input.position_setpoint_lu, input.feedforward_active);
+        let speed = self.position_loop.step(terms.reference_lu, measured_lu, terms.velocity_lu_s);
+
+        let mut tick = 0;
+        let mut current_sum_a = 0.0;
+        for _ in 0..self.speed_ticks {
+            let measured_rad_s = self.motor_encoder.measured_speed_rad_s(self.state);
+            let torque = self.speed_loop.step(speed.motor_speed_rad_s - measured_rad_s, terms.torque_n_m);
+
+            for _ in 0..self.current_ticks {
+                let voltage = self.current_loop.step(torque.current_a - self.state.current_a);
+                let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
+                observe(tick, self, &Wires { input, terms, measured_lu, speed, torque, gravity_n_m, voltage });
+                current_sum_a += self.state.current_a;
+                self.state = self.plant.step(self.state, voltage.voltage_v, gravity_n_m);
+                tick += 1;
+            }
+        }
+        self.current_mean_a = current_sum_a / f64::from(tick);
+    }
+
+    /// False once the axis has diverged: a set-point that was not a number, or gains so high that the sampled loop is unstable
+    /// and has left the range of f64. Every signal after that is NaN or infinite; nothing panics. The kernel raises an alarm.
+    pub fn is_finite(&self) -> bool {
+        let PlantState { current_a, speed_rad_s, angle_rad } = self.state;
+        current_a.is_finite()
+            && speed_rad_s.is_finite()
+            && angle_rad.is_finite()
+            && self.speed_loop.is_finite()
+            && self.current_loop.is_finite()
+    }
+
+    /// Motor and mechanics alone.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// i, w, th at the start of the next tick.
+    pub fn state(&self) -> PlantState {
+        self.state
+    }
+
+    /// Current ticks in a position cycle: calls of `each` in one [`AxisDrive::step_each`].
+    pub fn ticks_per_step(&self) -> u32 {
+        self.speed_ticks * self.current_ticks
+    }
+
+    /// The wires in the units of the load side.
+    fn signals(&self, wires: &Wires) -> AxisSignals {
+        let Wires { input, terms, measured_lu, speed, torque, gravity_n_m, voltage } = wires;
+        let position_lu = self.transmission_lu_per_rad * self.state.angle_rad;
+        let mut bits = 0;
+        for (set, flag) in [
+            (speed.clamped, flags::SPEED_CLAMP),
+            (torque.clamped, flags::CURRENT_LIMIT),
+            (voltage.clamped, flags::VOLTAGE_LIMIT),
+            (self.plant.sticks(self.state, *gravity_n_m), flags::STUCK),
+        ] {
+            bits |= if set { flag } else { 0 };
+        }
+        AxisSignals {
+            position_setpoint_lu: input.position_setpoint_lu,
+            position_reference_lu: terms.reference_lu,
+            position_actual_lu: position_lu,
+            position_measured_lu: *measured_lu,
+            control_deviation_lu: speed.deviation_lu,
+            following_error_lu: input.position_setpoint_lu - position_lu,
+            velocity_command_lu_s: speed.velocity_lu_s,
+            velocity_feedforward_lu_s: terms.velocity_lu_s,
+            velocity_actual_lu_s: self.transmission_lu_per_rad * self.state.speed_rad_s,
+            motor_speed_reference_rad_s: speed.motor_speed_rad_s,
+            motor_speed_rad_s: self.state.speed_rad_s,
+            torque_reference_n_m: torque.torque_n_m,
+            torque_feedforward_n_m: terms.torque_n_m,
+            friction_torque_n_m: self.plant.friction_n_m(self.state, *gravity_n_m),
+            gravity_torque_n_m: *gravity_n_m,
+            current_reference_a: torque.current_a,
+            current_a: self.state.current_a,
+            current_mean_a: self.current_mean_a,
+            voltage_v: voltage.voltage_v,
+            flags: bits,
+        }
+    }
+}
+
+/// Ratio of two cycles: whole and at least 1, which the checks of the machine file guarantee.
+fn whole_ratio(longer_ticks: u64, shorter_ticks: u64) -> u32 {
+    u32::try_from(longer_ticks / shorter_ticks.max(1)).unwrap_or(u32::MAX).max(1)
+}

@@ -1,0 +1,68 @@
+//! Set-point preparation: balancing delay, velocity and torque feed-forward (models/drive.md section 3).
+//!
+//! In: the set-point of a position cycle. Out: [`Terms`]: reference position, velocity feed-forward, torque feed-forward.
+//! Differences are backward ones: no look-ahead. The PT1 balancing of MD32810 (FFW_MODE 1, 2) is not modelled.
+
+use super::delay::DelayLine;
+use crate::machine::DriveData;
+
+/// What the loops get in one position cycle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Terms {
+    /// x_ref.
+    pub(super) reference_lu: f64,
+    /// v_ff (VFFWS).
+    pub(super) velocity_lu_s: f64,
+    /// t_ff (TFFWS).
+    pub(super) torque_n_m: f64,
+}
+
+/// The boxes "d/dt", "d²/dt²" and "delay".
+#[derive(Clone, Debug)]
+pub(super) struct Feedforward {
+    period_s: f64,
+    /// kvff.
+    velocity_weight_ratio: f64,
+    /// ktff J_ff / r.
+    torque_by_acceleration_n_m_s2_per_lu: f64,
+    setpoint_before_lu: f64,
+    velocity_before_lu_s: f64,
+    setpoint_delay: DelayLine,
+    velocity_delay: DelayLine,
+    acceleration_delay: DelayLine,
+}
+
+impl Feedforward {
+    /// At rest at `position_lu` for all times before.
+    pub(super) fn new(data: &DriveData, period_s: f64, position_lu: f64) -> Self {
+        let inertia_kg_m2 = data.torque_feedforward_ratio * data.feedforward_inertia_kg_m2;
+        Self {
+            period_s,
+            velocity_weight_ratio: data.velocity_feedforward_ratio,
+            torque_by_acceleration_n_m_s2_per_lu: inertia_kg_m2 / data.mechanics.transmission_lu_per_rad,
+            setpoint_before_lu: position_lu,
+            velocity_before_lu_s: 0.0,
+            setpoint_delay: DelayLine::new(data.setpoint_delay_s, period_s, position_lu),
+            velocity_delay: DelayLine::new(data.feedforward_delay_s, period_s, 0.0),
+            acceleration_delay: DelayLine::new(data.feedforward_delay_s, period_s, 0.0),
+        }
+    }
+
+    /// One position cycle. `active = false` (FFWOF): both weights are 0 in this cycle; the delay lines go on, so that FFWON
+    /// finds them filled, and the balancing delay stays.
+    pub(super) fn terms(&mut self, setpoint_lu: f64, active: bool) -> Terms {
+        let velocity_lu_s = (setpoint_lu - self.setpoint_before_lu) / self.period_s;
+        let acceleration_lu_s2 = (velocity_lu_s - self.velocity_before_lu_s) / self.period_s;
+        self.setpoint_before_lu = setpoint_lu;
+        self.velocity_before_lu_s = velocity_lu_s;
+
+        let reference_lu = self.setpoint_delay.step(setpoint_lu);
+        let velocity_lu_s = self.velocity_delay.step(velocity_lu_s) * self.velocity_weight_ratio;
+        let torque_n_m = self.acceleration_delay.step(acceleration_lu_s2) * self.torque_by_acceleration_n_m_s2_per_lu;
+        if active {
+            Terms { reference_lu, velocity_lu_s, torque_n_m }
+        } else {
+            Terms { reference_lu, velocity_lu_s: 0.0, torque_n_m: 0.0 }
+        }
+    }
+}

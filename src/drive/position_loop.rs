@@ -1,0 +1,53 @@
+//! Position controller: P with velocity feed-forward and clamp (models/drive.md section 4, step 1).
+//!
+//! In: reference and measured position, velocity feed-forward. Out: [`SpeedCommand`], held for a position cycle.
+
+use super::limit::limited;
+use crate::machine::DriveData;
+
+/// Output of the position controller.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SpeedCommand {
+    /// e_fol: what a control displays.
+    pub(super) deviation_lu: f64,
+    /// v_cmd.
+    pub(super) velocity_lu_s: f64,
+    /// w_ref.
+    pub(super) motor_speed_rad_s: f64,
+    /// The speed clamp holds.
+    pub(super) clamped: bool,
+}
+
+/// The boxes "Kv", "clamp ±v_max" and "/r".
+#[derive(Clone, Debug)]
+pub(super) struct PositionLoop {
+    /// Kv.
+    gain_per_s: f64,
+    /// v_max.
+    velocity_max_lu_s: f64,
+    /// r.
+    transmission_lu_per_rad: f64,
+}
+
+impl PositionLoop {
+    pub(super) fn new(data: &DriveData) -> Self {
+        Self {
+            gain_per_s: data.position_gain_per_s,
+            velocity_max_lu_s: data.speed_setpoint_max_lu_s,
+            transmission_lu_per_rad: data.mechanics.transmission_lu_per_rad,
+        }
+    }
+
+    /// One position cycle.
+    pub(super) fn step(&self, reference_lu: f64, measured_lu: f64, velocity_feedforward_lu_s: f64) -> SpeedCommand {
+        let deviation_lu = reference_lu - measured_lu;
+        let wanted_lu_s = self.gain_per_s * deviation_lu + velocity_feedforward_lu_s;
+        let velocity_lu_s = limited(wanted_lu_s, self.velocity_max_lu_s);
+        SpeedCommand {
+            deviation_lu,
+            velocity_lu_s,
+            motor_speed_rad_s: velocity_lu_s / self.transmission_lu_per_rad,
+            clamped: wanted_lu_s.abs() > self.velocity_max_lu_s,
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The drive room from outside: closed forms of models/drive.md section 7, edge cases of section 8, an independent reference.
+
+mod closed_forms;
+mod friction;
+mod limits;
+mod linear;
+mod plant;
+mod reference;
+mod rig;

@@ -1,0 +1,101 @@
+//! Against tools/drive_reference.py: scipy's DOP853 with events, written from the model text.
+//!
+//! Tolerances: the reference integrates with a relative tolerance of 1e-12 a tick and finds events to about 4e-16 s; its table has
+//! 13 digits. Errors of a tick do not add up (the loops forget them), but an event that moves by dt moves the position by w' dt²
+//! only. What remains is some 1e-12 of each signal's range; 1e-11 of the range is asked for. The one-branch form without split ticks misses that by far (1e-8 and more).
+
+use crate::rig::{self, Rig, input};
+use sollwert::drive::{AxisSignals, DriveInput, flags};
+use std::f64::consts::TAU;
+
+const REFERENCE: &str = include_str!("reference.csv");
+const TOLERANCE_SHARE: f64 = 1e-11;
+
+/// Compares every kept row; flags must be equal.
+fn compare(case: &str, signals: &[AxisSignals]) {
+    let rows: Vec<Vec<f64>> = REFERENCE
+        .lines()
+        .filter_map(|line| line.strip_prefix(case)?.strip_prefix(','))
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
+        .collect();
+    assert!(rows.len() >= 30, "{case}: only {} rows", rows.len());
+    let names = ["x", "x_meas", "e_fol", "w", "i", "i_avg", "u", "t_ref", "t_fric"];
+    let mut worst = [0.0_f64; 9];
+    for row in &rows {
+        let s = &signals[row[0] as usize];
+        let got = [
+            s.position_actual_lu,
+            s.position_measured_lu,
+            s.control_deviation_lu,
+            s.motor_speed_rad_s,
+            s.current_a,
+            s.current_mean_a,
+            s.voltage_v,
+            s.torque_reference_n_m,
+            s.friction_torque_n_m,
+        ];
+        for (worst, (got, expected)) in worst.iter_mut().zip(got.iter().zip(&row[1..])) {
+            *worst = worst.max((got - expected).abs());
+        }
+        assert_eq!(f64::from(s.flags), row[10], "{case}: flags at k = {}", row[0]);
+    }
+    for (column, name) in names.iter().enumerate() {
+        let range = rows.iter().map(|row| row[column + 1].abs()).fold(0.0, f64::max);
+        assert!(worst[column] <= TOLERANCE_SHARE * range, "{case}: {name} is off by {:e} of {range:e}", worst[column]);
+    }
+}
+
+fn setpoints(count: u32, setpoint_lu: impl Fn(f64) -> f64) -> impl Iterator<Item = DriveInput> {
+    (0..count).map(move |k| input(setpoint_lu(f64::from(k))))
+}
+
+#[test]
+fn reversals_with_both_feedforwards() {
+    let rig = rig::mvc_x().with(|data| {
+        data.velocity_feedforward_ratio = 1.0;
+        data.setpoint_delay_s = 1.2e-3;
+        data.torque_feedforward_ratio = 0.5;
+        data.feedforward_delay_s = 0.3e-3;
+    });
+    compare("reversal", &rig.run(setpoints(161, |k| 2.0 * (TAU * 8.0 * k * 1e-3).sin())));
+}
+
+#[test]
+fn stick_slip_on_a_slow_ramp() {
+    let rig = rig::mvc_y().friction(1.2, 3.6).with(|data| data.speed_reset_time_s = 0.004);
+    let signals = rig.run(setpoints(401, |k| if k < 2.0 { 0.0 } else { 0.01 + 0.0002 * k }));
+    let breakaways = signals.windows(2).filter(|two| two[0].flags & flags::STUCK > two[1].flags & flags::STUCK).count();
+    assert!(breakaways >= 6, "the case must hold stick-slip, not {breakaways} slips");
+    compare("stick_slip", &signals);
+}
+
+#[test]
+fn hunting_at_a_constant_setpoint() {
+    let rig = rig::mvc_y().friction(1.2, 3.6).with(|data| data.speed_reset_time_s = 0.004);
+    compare("hunting", &rig.run(setpoints(461, |k| if k < 2.0 { 0.0 } else { 0.01 })));
+}
+
+#[test]
+fn saturation_of_a_vertical_axis_under_load() {
+    let rig = rig::ucp_z().with(|data| {
+        data.voltage_max_v = 35.0;
+        data.speed_setpoint_max_lu_s = 250.0;
+        data.current_max_a = 20.0;
+    });
+    let inputs = (0..121).map(|k| DriveInput {
+        load_n_m: if (70..90).contains(&k) { 3.0 } else { 0.0 },
+        ..input(if k < 5 { 0.0 } else { 20.0 })
+    });
+    compare("saturation", &rig.run(inputs));
+}
+
+#[test]
+fn tilting_table_with_quantised_encoders_from_a_cold_start() {
+    let rig: Rig = rig::ucp_a().friction(0.7, 0.9).cold().with(|data| {
+        data.mechanics.transmission_lu_per_rad = -1.0 / 120.0;
+        data.velocity_feedforward_ratio = 1.0;
+        data.encoder.position_resolution_lu = 2e-6;
+        data.encoder.motor_resolution_rad = 2e-4;
+    });
+    compare("tilt", &rig.run(setpoints(131, |k| 0.3 + 0.05 * (1.0 - (TAU * 4.0 * k * 2e-3).cos()))));
+}
