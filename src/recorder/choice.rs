@@ -1,0 +1,207 @@
+//! Which signals go into a recording: `--record X.current,Y.*`.
+//!
+//! In: the words of the user, the machine's axes. Out: [`SignalChoice`]. `/path` and `/event` are always recorded: without them
+//! no sample knows its line. Does not decide how often a signal is recorded.
+
+use super::schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, SignalSource, TOOL_TOPICS};
+use crate::base::diagnostics::nearest;
+use crate::base::{AxisId, Diagnostic, PerAxis, SourceText, Span};
+use crate::machine::Machine;
+
+/// A set of axis fields and tool poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SignalChoice {
+    /// Bit i: field i of `AXIS_FIELDS`.
+    fields: PerAxis<u32>,
+    /// By `ToolPose::index`.
+    poses: [bool; TOOL_TOPICS.len()],
+}
+
+/// Bits of all fields.
+const ALL_FIELDS: u32 = (1 << AXIS_FIELD_COUNT) - 1;
+
+impl Default for SignalChoice {
+    fn default() -> Self {
+        Self::all()
+    }
+}
+
+impl SignalChoice {
+    /// Everything.
+    pub fn all() -> Self {
+        Self { fields: PerAxis::splat(ALL_FIELDS), poses: [true; TOOL_TOPICS.len()] }
+    }
+
+    /// What exists without drives: position, velocity, acceleration and jerk of the set-points, and the tool at the set-point.
+    pub fn setpoints() -> Self {
+        Self { fields: PerAxis::splat(fields_of(|source| source == SignalSource::Interpolator)), poses: [true, false] }
+    }
+
+    /// What both choices hold.
+    pub fn and(&self, other: &Self) -> Self {
+        Self {
+            fields: PerAxis::from_fn(|axis| self.fields[axis] & other.fields[axis]),
+            poses: std::array::from_fn(|i| self.poses[i] && other.poses[i]),
+        }
+    }
+
+    /// True if any field of the axis is chosen.
+    pub fn axis(&self, axis: AxisId) -> bool {
+        self.fields[axis] != 0
+    }
+
+    /// Places in [`AXIS_FIELDS`] of the chosen fields of an axis, in order.
+    pub fn fields(&self, axis: AxisId) -> impl Iterator<Item = usize> + use<> {
+        let bits = self.fields[axis];
+        (0..AXIS_FIELD_COUNT).filter(move |field| bits & (1 << field) != 0)
+    }
+
+    /// True if the tool pose at this place of `TOOL_TOPICS` is chosen.
+    pub fn pose(&self, index: usize) -> bool {
+        self.poses[index]
+    }
+
+    /// What of this choice the machine can give: an axis whose drive the machine file does not describe has no motor.
+    pub fn on(&self, machine: &Machine) -> Self {
+        let mut fields = PerAxis::splat(0);
+        for axis in machine.axis_ids() {
+            fields[axis] = self.fields[axis] & existing_fields(machine, axis);
+        }
+        Self { fields, poses: self.poses }
+    }
+
+    /// Reads a list of words between commas. A word is `AXIS.FIELD`, where `*` stands for any axis, or for any part of a field
+    /// name (with or without its unit); `AXIS` alone means all of its fields; `tool`, `tool.setpoint` and `tool.actual` are the
+    /// poses; `path` and `event` may be named, and are recorded in any case.
+    pub fn parse(text: &str, machine: &Machine) -> Result<Self, Diagnostic> {
+        let source = SourceText::new("--record", text);
+        let mut choice = Self { fields: PerAxis::splat(0), poses: [false; TOOL_TOPICS.len()] };
+        let mut start = 0;
+        for part in text.split(',') {
+            let word = part.trim();
+            let at = start + (part.len() - part.trim_start().len());
+            choice.add(word, machine).map_err(|fault| fault.place_in(&source, at..at + word.len()))?;
+            start += part.len() + 1;
+        }
+        Ok(choice)
+    }
+
+    fn add(&mut self, word: &str, machine: &Machine) -> Result<(), Unknown> {
+        match word.to_ascii_lowercase().as_str() {
+            "" => return Err(Unknown::new("a signal is missing here", "write AXIS.FIELD, such as X.current or X.*")),
+            "path" | "path.*" | "event" | "event.*" => return Ok(()),
+            "tool" | "tool.*" => self.poses = [true; TOOL_TOPICS.len()],
+            "tool.setpoint" => self.poses[0] = true,
+            "tool.actual" => self.poses[1] = true,
+            _ => return self.add_axis_word(word, machine),
+        }
+        Ok(())
+    }
+
+    fn add_axis_word(&mut self, word: &str, machine: &Machine) -> Result<(), Unknown> {
+        let (axis_name, pattern) = word.split_once('.').unwrap_or((word, "*"));
+        let axes: Vec<AxisId> = match axis_name {
+            "*" => machine.axis_ids().collect(),
+            name => vec![machine.axis_by_name(name).ok_or_else(|| unknown_axis(name, machine))?],
+        };
+        let named = fields_named(pattern);
+        if named == 0 {
+            return Err(unknown_field(pattern));
+        }
+        let mut found = false;
+        for axis in axes {
+            let fields = named & existing_fields(machine, axis);
+            found |= fields != 0;
+            self.fields[axis] |= fields;
+        }
+        if found {
+            return Ok(());
+        }
+        Err(Unknown::new(
+            format!("`{word}` does not exist on this machine: the axis has no drive"),
+            "give the axis `drive`, `motor` and `mechanics` in the machine file, or leave the signal out",
+        ))
+    }
+}
+
+/// A word that names nothing.
+struct Unknown {
+    message: String,
+    help: String,
+}
+
+impl Unknown {
+    fn new(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { message: message.into(), help: help.into() }
+    }
+
+    fn place_in(self, source: &SourceText, span: Span) -> Diagnostic {
+        Diagnostic::error("R0020", self.message).at(source.place(span, "")).help(self.help)
+    }
+}
+
+fn unknown_axis(name: &str, machine: &Machine) -> Unknown {
+    let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+    let known = names.join(", ");
+    let words = names.iter().copied().chain(["tool", "path", "event"]);
+    let help = match nearest(name, words) {
+        Some(word) => format!("did you mean `{word}`? Axes of this machine: {known}"),
+        None => format!("axes of this machine: {known}"),
+    };
+    Unknown::new(format!("`{name}` is neither an axis of this machine nor `tool`, `path` or `event`"), help)
+}
+
+fn unknown_field(pattern: &str) -> Unknown {
+    let known = AXIS_FIELDS.iter().flat_map(|field| [field.stem, field.linear, field.rotary]);
+    let help = match nearest(pattern, known) {
+        Some(word) => format!("did you mean `{word}`?"),
+        None => {
+            let stems: Vec<&str> = AXIS_FIELDS.iter().map(|field| field.stem).collect();
+            format!("fields of an axis: {}", stems.join(", "))
+        }
+    };
+    Unknown::new(format!("`{pattern}` is not a field of an axis"), help)
+}
+
+/// Fields that the axis has.
+fn existing_fields(machine: &Machine, axis: AxisId) -> u32 {
+    match machine.axis(axis).drive {
+        Some(_) => ALL_FIELDS,
+        None => fields_of(|source| source != SignalSource::Drive),
+    }
+}
+
+fn fields_of(keep: impl Fn(SignalSource) -> bool) -> u32 {
+    bits(AXIS_FIELDS.iter().map(|field| keep(field.source)))
+}
+
+fn fields_named(pattern: &str) -> u32 {
+    let pattern = pattern.to_ascii_lowercase();
+    let matches = |name: &str| matches_pattern(pattern.as_bytes(), name.as_bytes());
+    bits(AXIS_FIELDS.iter().map(|field| matches(field.stem) || matches(field.linear) || matches(field.rotary)))
+}
+
+fn bits(chosen: impl Iterator<Item = bool>) -> u32 {
+    chosen.enumerate().map(|(i, chosen)| u32::from(chosen) << i).sum()
+}
+
+/// Shell-like match: `*` stands for any run of bytes. Greedy with one way back, so that its time is at most the product of the
+/// lengths whatever the user types.
+fn matches_pattern(pattern: &[u8], name: &[u8]) -> bool {
+    let (mut p, mut n) = (0, 0);
+    let mut back: Option<(usize, usize)> = None;
+    while n < name.len() {
+        if pattern.get(p) == Some(&b'*') {
+            back = Some((p, n));
+            p += 1;
+        } else if pattern.get(p) == Some(&name[n]) {
+            (p, n) = (p + 1, n + 1);
+        } else if let Some((star, taken)) = back {
+            back = Some((star, taken + 1));
+            (p, n) = (star + 1, taken + 1);
+        } else {
+            return false;
+        }
+    }
+    pattern[p..].iter().all(|byte| *byte == b'*')
+}

@@ -1,0 +1,221 @@
+//! From internal units to messages: rad -> deg, s -> min, mm -> m, and the bytes of protobuf.
+//!
+//! In: the wires of a tick. Out: encoded messages, appended to a buffer that is used again. Axis messages are encoded from the
+//! table of `schema`; a test holds them against the generated types. Does not know files.
+
+use super::batch::Record;
+use super::event::EventRecord;
+use super::schema::proto::foxglove::{Pose, PoseInFrame, Quaternion, Vector3};
+use super::schema::proto::google::protobuf::Timestamp;
+use super::schema::proto::sollwert::{Event, Path};
+use super::schema::{AXIS_FIELDS, FLAGS_FIELD, FieldUnit, POSE_FRAME};
+use crate::base::units::{MM_PER_M, NS_PER_S, deg_from_rad, mm_min_from_mm_s};
+use crate::base::{AxisKind, PerAxis};
+use crate::drive::AxisSignals;
+use crate::interpolator::{AxisSetpoint, PathSample};
+use crate::machine::Machine;
+use crate::program::{BlockRef, ProgramId};
+use prost::Message;
+use std::sync::Arc;
+
+/// Bits of the mantissa that an `f64` stores.
+const MANTISSA_BITS: u8 = 52;
+
+/// How many mantissa bits are kept: fewer bits compress better.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Precision {
+    dropped_bits: u8,
+}
+
+impl Precision {
+    /// `None` keeps every bit.
+    pub(super) fn new(mantissa_bits: Option<u8>) -> Self {
+        Self { dropped_bits: mantissa_bits.map_or(0, |bits| MANTISSA_BITS.saturating_sub(bits)) }
+    }
+
+    /// The nearest number with so many bits, ties to even. A number that would round to infinity is kept.
+    pub(super) fn round(self, value: f64) -> f64 {
+        if self.dropped_bits == 0 || !value.is_finite() {
+            return value;
+        }
+        let bits = value.to_bits();
+        let unit = 1_u64 << self.dropped_bits;
+        let odd = (bits >> self.dropped_bits) & 1;
+        // A carry runs from the mantissa into the exponent, which is what rounding up to a power of two means.
+        let rounded = f64::from_bits((bits + (unit / 2 - 1) + odd) & !(unit - 1));
+        if rounded.is_finite() { rounded } else { value }
+    }
+}
+
+/// Encodes messages of one axis.
+#[derive(Clone, Debug)]
+pub(super) struct AxisEncoder {
+    fields: Vec<usize>,
+    kind: AxisKind,
+    precision: Precision,
+}
+
+impl AxisEncoder {
+    pub(super) fn new(kind: AxisKind, fields: Vec<usize>, precision: Precision) -> Self {
+        Self { fields, kind, precision }
+    }
+
+    pub(super) fn encode(&self, setpoint: &AxisSetpoint, signals: &AxisSignals, buffer: &mut Vec<u8>) {
+        for &i in &self.fields {
+            let tag = i as u32 + 1;
+            if i == FLAGS_FIELD {
+                prost::encoding::uint32::encode(tag, &signals.flags, buffer);
+                continue;
+            }
+            let field = &AXIS_FIELDS[i];
+            let inside = (field.value)(setpoint, signals);
+            let value = match (field.unit, self.kind) {
+                (FieldUnit::AxisLength, AxisKind::Rotary) => deg_from_rad(inside),
+                _ => inside,
+            };
+            prost::encoding::double::encode(tag, &self.precision.round(value), buffer);
+        }
+    }
+}
+
+/// Encodes everything else; keeps its messages, so that their texts are allocated once.
+#[derive(Clone, Debug)]
+pub(super) struct RunEncoder {
+    axis_names: PerAxis<Arc<str>>,
+    programs: Vec<(ProgramId, Arc<str>)>,
+    precision: Precision,
+    path: Path,
+    pose: PoseInFrame,
+}
+
+impl RunEncoder {
+    pub(super) fn new(machine: &Machine, precision: Precision) -> Self {
+        let name = |i: usize| machine.axes.get(i).map_or("", |axis| axis.name.as_str());
+        let pose = PoseInFrame { frame_id: Some(POSE_FRAME.to_owned()), ..PoseInFrame::default() };
+        Self {
+            axis_names: PerAxis::from_fn(|axis| Arc::from(name(axis.index()))),
+            programs: Vec::new(),
+            precision,
+            path: Path::default(),
+            pose,
+        }
+    }
+
+    /// From now on blocks of this program are told by its name.
+    pub(super) fn add_program(&mut self, id: ProgramId, name: &Arc<str>) {
+        self.programs.push((id, name.clone()));
+    }
+
+    /// Appends the message of any record but those of axes and programs.
+    pub(super) fn encode(&mut self, record: &Record, time_ns: u64, buffer: &mut Vec<u8>) {
+        match record {
+            Record::Path { sample, contour_error_mm, .. } => self.encode_path(sample, *contour_error_mm, buffer),
+            Record::Pose { position_mm, quaternion_xyzw, .. } => {
+                self.encode_pose(time_ns, *position_mm, *quaternion_xyzw, buffer);
+            }
+            Record::Event { block, event, .. } => {
+                let message = self.event_message(*block, event);
+                message.encode_raw(buffer);
+            }
+            Record::Axis { .. } | Record::Program { .. } => {}
+        }
+    }
+
+    fn program_name(&self, id: ProgramId) -> Option<&Arc<str>> {
+        self.programs.iter().find(|(known, _)| *known == id).map(|(_, name)| name)
+    }
+
+    fn encode_path(&mut self, sample: &PathSample, contour_error_mm: Option<f64>, buffer: &mut Vec<u8>) {
+        let round = |value: f64| self.precision.round(value);
+        // Only rotary axes move: deg under the names of mm, as docs/recording.md says.
+        let length = |value_lu: f64| if sample.rotary_only { deg_from_rad(value_lu) } else { value_lu };
+        let feed = |value_lu_s: f64| round(mm_min_from_mm_s(length(value_lu_s)));
+        let mut path = std::mem::take(&mut self.path);
+        set_text(&mut path.program, self.program_name(sample.block.program).map(|name| &**name));
+        set_text(&mut path.limit_axis, sample.limit.axis.map(|axis| &*self.axis_names[axis]));
+        set_text(&mut path.limit_kind, Some(sample.limit.kind.name()));
+        path.block = Some(sample.block.number);
+        path.line = Some(sample.block.line);
+        path.s_mm = Some(round(sample.path_length_mm));
+        path.feed_mm_min = Some(feed(sample.feed_lu_s));
+        path.programmed_feed_mm_min = sample.programmed_feed_lu_s.map(feed);
+        path.acceleration_mm_s2 = Some(round(length(sample.acceleration_lu_s2)));
+        path.jerk_mm_s3 = Some(round(length(sample.jerk_lu_s3)));
+        path.buffered_blocks = Some(sample.buffered_blocks);
+        path.contour_error_mm = contour_error_mm.map(round);
+        path.rotary_only = Some(sample.rotary_only);
+        path.encode_raw(buffer);
+        self.path = path;
+    }
+
+    fn encode_pose(&mut self, time_ns: u64, position_mm: [f64; 3], quaternion_xyzw: [f64; 4], buffer: &mut Vec<u8>) {
+        let second_ns = NS_PER_S as u64;
+        let [x, y, z] = position_mm.map(|value_mm| Some(self.precision.round(value_mm / MM_PER_M)));
+        let [qx, qy, qz, qw] = quaternion_xyzw.map(|value| Some(self.precision.round(value)));
+        // Both casts fit: simulated seconds stay far below 2^63, nanoseconds of a second below 2^30.
+        self.pose.timestamp =
+            Some(Timestamp { seconds: (time_ns / second_ns) as i64, nanos: (time_ns % second_ns) as i32 });
+        self.pose.pose = Some(Pose {
+            position: Some(Vector3 { x, y, z }),
+            orientation: Some(Quaternion { x: qx, y: qy, z: qz, w: qw }),
+        });
+        self.pose.encode_raw(buffer);
+    }
+
+    fn event_message(&self, block: Option<BlockRef>, event: &EventRecord) -> Event {
+        let mut message = Event::default();
+        if let Some(block) = block {
+            message.program = self.program_name(block.program).map(|name| name.to_string());
+            message.block = Some(block.number);
+            message.line = Some(block.line);
+        }
+        let (kind, text) = match event {
+            EventRecord::BlockStart => ("block_start", String::new()),
+            EventRecord::MFunction(number) => {
+                message.m_function = Some(*number);
+                ("m", format!("M{number}"))
+            }
+            EventRecord::SpindleSpeed { speed_rpm } => {
+                message.speed_rpm = Some(*speed_rpm);
+                ("s", format!("S{speed_rpm}"))
+            }
+            EventRecord::Tool(tool) => ("t", format!("T{tool}")),
+            EventRecord::Edge(number) => {
+                message.edge = Some(*number);
+                ("d", format!("D{number}"))
+            }
+            EventRecord::Message(text) => ("msg", text.to_string()),
+            EventRecord::ProgramOpened(name) => ("program", name.to_string()),
+            EventRecord::Corner { angle_rad, tolerance_mm, transition_length_mm, feed_mm_s } => {
+                message.angle_deg = Some(deg_from_rad(*angle_rad));
+                message.tolerance_mm = Some(*tolerance_mm);
+                message.transition_length_mm = Some(*transition_length_mm);
+                message.feed_mm_s = Some(*feed_mm_s);
+                ("corner", String::new())
+            }
+            EventRecord::Warning { code, message: text } => {
+                message.code = Some((*code).to_owned());
+                ("warning", text.to_string())
+            }
+            EventRecord::Alarm { code, message: text } => {
+                message.code = Some((*code).to_owned());
+                ("alarm", text.to_string())
+            }
+        };
+        message.kind = Some(kind.to_owned());
+        message.text = (!text.is_empty() || kind == "msg").then_some(text);
+        message
+    }
+}
+
+/// Writes a text into a place that may already hold one, without a new allocation.
+fn set_text(place: &mut Option<String>, text: Option<&str>) {
+    match text {
+        Some(text) => {
+            let place = place.get_or_insert_with(String::new);
+            place.clear();
+            place.push_str(text);
+        }
+        None => *place = None,
+    }
+}
