@@ -82,3 +82,8 @@ fn no_path_of_a_build_machine_is_committed() {
 fn links_between_documents_lead_somewhere() {
     assert_tidy(documents::links(&Repository::here()));
 }
+
+#[test]
+fn the_index_leads_to_every_document() {
+    assert_tidy(documents::index(&Repository::here()));
+}

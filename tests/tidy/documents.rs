@@ -1,4 +1,4 @@
-//! Rules about documents: a link between them leads to a file that is there.
+//! Rules about documents: a link between them leads to a file that is there, and the index of `docs/` leads to each.
 //!
 //! In: a [`Repository`]. Out: [`Fault`]s. Addresses on the web are not looked up: the tests need no network.
 
@@ -23,6 +23,18 @@ pub fn links(repository: &Repository) -> Vec<Fault> {
         }
     }
     faults
+}
+
+/// `docs/README.md` links every document of `docs/`: one that no link leads to is not read.
+pub fn index(repository: &Repository) -> Vec<Fault> {
+    const INDEX: &str = "docs/README.md";
+    let Some(index) = repository.file(INDEX) else { return Vec::new() };
+    let linked: Vec<String> = targets(&index.text).iter().map(|(target, _)| resolve(INDEX, target)).collect();
+    let documents = repository.files.iter().filter(|file| file.path.starts_with("docs/") && file.path.ends_with(".md"));
+    documents
+        .filter(|file| file.path != INDEX && !linked.contains(&file.path))
+        .map(|file| file.fault(0, "index", format!("{INDEX} does not lead here")))
+        .collect()
 }
 
 /// Link targets outside code blocks and `code`, with their places.

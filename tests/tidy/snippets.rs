@@ -145,6 +145,13 @@ fn links_to_nowhere_are_found() {
 }
 
 #[test]
+fn a_document_beside_the_index_is_found() {
+    let index = ("docs/README.md", "[a](a.md)\n");
+    let faults = documents::index(&Repository::of(&[index, ("docs/a.md", ""), ("docs/b.md", "")]));
+    assert_eq!(faults.iter().map(|fault| fault.path.as_str()).collect::<Vec<_>>(), ["docs/b.md"]);
+}
+
+#[test]
 fn code_is_told_from_comments_and_strings() {
     let text = "a /* b /* c */ d */ e // f\n'g' 'h: 'loop r\"i\" br#\"j\"k\"# \"l\\\"m\" '\\'' '\u{b5}' n";
     let code = code_only(text);
