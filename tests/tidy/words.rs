@@ -23,10 +23,11 @@ const KEYS_WITHOUT_UNIT: [&str; 13] = [
     "curve",
 ];
 /// Names that say by themselves that the number is dimensionless.
-const NAMES_WITHOUT_UNIT: [&str; 4] = ["u", "factor", "ratio", "share"];
-/// A number of the NC language has no unit until a word gives it one.
-const NC_ROOMS: [&str; 2] = ["program", "interpreter"];
-const NC_NAMES: [&str; 6] = ["value", "number", "argument", "arguments", "left", "right"];
+const NAMES_WITHOUT_UNIT: [&str; 6] = ["u", "factor", "ratio", "share", "direction", "quaternion_xyzw"];
+/// Rooms at a border: there a number may get its unit from what stands beside it (an NC word, a key, a field of the schema) ...
+const BORDER_ROOMS: [&str; 5] = ["program", "interpreter", "machine", "recorder", "cli"];
+/// ... and is then called one of these.
+const BORDER_NAMES: [&str; 7] = ["value", "values", "number", "argument", "arguments", "left", "right"];
 /// Types that hold floats under one name.
 const WRAPPERS: [&str; 5] = ["Option<", "Vec<", "Box<", "Spanned<", "std::ops::Range<"];
 
@@ -70,12 +71,12 @@ pub fn float_names(repository: &Repository) -> Vec<Fault> {
     for file in repository.sources() {
         let code = code_only(&file.text);
         let tokens = tokens(&code);
-        let nc_room = file.room().is_some_and(|room| NC_ROOMS.contains(&room));
+        let border = file.room().is_some_and(|room| BORDER_ROOMS.contains(&room));
         for (name, offset) in public_floats(&tokens) {
             let fine = ends_in_unit(name, &units)
                 || NAMES_WITHOUT_UNIT.contains(&name)
                 || KEYS_WITHOUT_UNIT.contains(&name)
-                || (nc_room && NC_NAMES.contains(&name));
+                || (border && BORDER_NAMES.contains(&name));
             if !fine {
                 let reason = format!("`{name}: f64` does not end in a unit of the list in src/base/units.rs");
                 faults.push(file.fault(offset, "unit", reason));
