@@ -24,10 +24,12 @@ const KEYS_WITHOUT_UNIT: [&str; 13] = [
 ];
 /// Names that say by themselves that the number is dimensionless.
 const NAMES_WITHOUT_UNIT: [&str; 6] = ["u", "factor", "ratio", "share", "direction", "quaternion_xyzw"];
-/// Rooms at a border: there a number may get its unit from what stands beside it (an NC word, a key, a field of the schema) ...
-const BORDER_ROOMS: [&str; 5] = ["program", "interpreter", "machine", "recorder", "cli"];
-/// ... and is then called one of these.
-const BORDER_NAMES: [&str; 7] = ["value", "values", "number", "argument", "arguments", "left", "right"];
+/// Rooms at a border, and names that are fine there: the unit comes from what stands beside the number (an NC word and the modes
+/// that are active, a key of the machine file, a field of the schema).
+const NAMES_AT_BORDERS: [(&[&str], &[&str]); 2] = [
+    (&["program", "interpreter", "machine", "recorder", "cli"], &["value", "values", "number"]),
+    (&["program", "interpreter"], &["argument", "arguments", "left", "right", "feed"]),
+];
 /// Types that hold floats under one name.
 const WRAPPERS: [&str; 5] = ["Option<", "Vec<", "Box<", "Spanned<", "std::ops::Range<"];
 
@@ -71,12 +73,11 @@ pub fn float_names(repository: &Repository) -> Vec<Fault> {
     for file in repository.sources() {
         let code = code_only(&file.text);
         let tokens = tokens(&code);
-        let border = file.room().is_some_and(|room| BORDER_ROOMS.contains(&room));
         for (name, offset) in public_floats(&tokens) {
             let fine = ends_in_unit(name, &units)
                 || NAMES_WITHOUT_UNIT.contains(&name)
                 || KEYS_WITHOUT_UNIT.contains(&name)
-                || (border && BORDER_NAMES.contains(&name));
+                || fine_at_border(file, name);
             if !fine {
                 let reason = format!("`{name}: f64` does not end in a unit of the list in src/base/units.rs");
                 faults.push(file.fault(offset, "unit", reason));
@@ -84,6 +85,11 @@ pub fn float_names(repository: &Repository) -> Vec<Fault> {
         }
     }
     faults
+}
+
+fn fine_at_border(file: &TextFile, name: &str) -> bool {
+    let room = file.room().unwrap_or_default();
+    NAMES_AT_BORDERS.iter().any(|(rooms, names)| rooms.contains(&room) && names.contains(&name))
 }
 
 /// Names of public fields, of fields of public enums and of parameters of public functions that are floats.
