@@ -1,1 +1,83 @@
-//! placeholder
+//! The command. One file per sub-command: read arguments, call one library function, print.
+//!
+//! In: command line. Out: tables or one JSON document on stdout, findings and progress on stderr, exit code 0 (done), 1 (the work
+//! found something wrong) or 2 (wrong usage, unreadable input). No physics here.
+
+mod check;
+mod demo;
+mod export;
+mod follow;
+mod inputs;
+mod machine;
+mod moves;
+mod output;
+mod recover;
+mod run;
+mod time;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Exit code 1: the work found something wrong.
+const FOUND_WRONG: u8 = 1;
+/// Exit code 2: wrong usage or unreadable input.
+const UNREADABLE: u8 = 2;
+
+/// A virtual NC kernel: replays SINUMERIK NC programs cycle by cycle on a machine's limits and records every signal.
+#[derive(Parser)]
+#[command(name = "sollwert", version, max_term_width = 110, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "Examples:
+  sollwert demo                                        write a program and a machine to look at, and run them
+  sollwert run part.mpf -m spinner_mvc850 -o part.mcap  replay, record everything
+  sollwert time part.mpf -m my_machine.toml            set-points only: cycle time, and what limits the feed
+  sollwert machine check my_machine.toml               is the machine file right?
+
+-m takes a path or the name of a shipped machine; `sollwert machine list` names them.
+Exit codes: 0 done, 1 something is wrong with the program, machine or trace, 2 wrong usage or unreadable input.";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Replay a program: set-points, drives, recording
+    Run(run::RunArguments),
+    /// Set-points only, fast: cycle time, and the share of time of each feed limit
+    Time(time::TimeArguments),
+    /// All diagnostics of a program
+    Check(check::CheckArguments),
+    /// What the interpreter makes of a program, one line a move
+    Moves(moves::MovesArguments),
+    /// The drives alone, fed with given position set-points
+    Follow(follow::FollowArguments),
+    /// A recording as CSV
+    Export(export::ExportArguments),
+    /// Rescue what an interrupted run left
+    Recover(recover::RecoverArguments),
+    /// Machine files: check, list, show, schema
+    Machine(machine::MachineArguments),
+    /// Write a program and a machine to look at, and run them
+    Demo(demo::DemoArguments),
+}
+
+/// Reads the command line, does the work, returns the exit code.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let code = match arguments.command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Time(arguments) => time::time(&arguments),
+        Command::Check(arguments) => check::check(&arguments),
+        Command::Moves(arguments) => moves::moves(&arguments),
+        Command::Follow(arguments) => follow::follow(&arguments),
+        Command::Export(arguments) => export::export(&arguments),
+        Command::Recover(arguments) => recover::recover(&arguments),
+        Command::Machine(arguments) => machine::machine(&arguments),
+        Command::Demo(arguments) => demo::demo(&arguments),
+    };
+    match code {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(code) => ExitCode::from(code),
+    }
+}

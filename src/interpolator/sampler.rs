@@ -8,10 +8,10 @@
 //! Does not plan, and does not know what events mean.
 
 use super::{AxisSetpoint, PathSample, Setpoint};
-use crate::base::{PerAxis, TimeBase};
+use crate::base::{AxisVector, PerAxis, TimeBase};
 use crate::feed::{Limit, LimitKind, PathState, PlannedPiece};
 use crate::interpreter::{Event, Feed};
-use crate::machine::Machine;
+use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 use crate::smoothing::{Corner, PieceKind};
 
@@ -40,6 +40,10 @@ pub struct Begun {
     pub block: BlockRef,
     /// Motion blocks that begin with it.
     pub blocks_begun: u32,
+    /// It must end at rest.
+    pub stop_at_end: bool,
+    /// Path mode in force.
+    pub path_mode: PathMode,
     /// What is output at its start.
     pub events: Vec<Event>,
     /// The corner, where the piece is a blend.
@@ -50,6 +54,8 @@ pub struct Begun {
     pub programmed_feed_lu_s: Option<f64>,
     /// Path length; 0 for a wait.
     pub length_lu: f64,
+    /// From its start to its end, per axis.
+    pub displacement_lu: AxisVector,
     /// The `_lu` here are rad: no linear axis moves.
     pub rotary_only: bool,
     /// Time of its law.
@@ -128,6 +134,11 @@ impl Interpolator {
         &mut self.begun
     }
 
+    /// Exchanges the list of what began for `other`, so that it outlives the next sample without a copy.
+    pub fn swap_begun(&mut self, other: &mut Vec<Begun>) {
+        std::mem::swap(&mut self.begun, other);
+    }
+
     /// True once the set-point at the end of the path has been given.
     pub fn ended(&self) -> bool {
         self.ended
@@ -155,11 +166,14 @@ impl Interpolator {
         self.begun.push(Begun {
             block: contour.block,
             blocks_begun: contour.blocks_begun,
+            stop_at_end: contour.stop_at_end,
+            path_mode: contour.modes.path_mode,
             events,
             corner,
             entry_feed_lu_s: piece.law.at(0.0).velocity_lu_s,
             programmed_feed_lu_s: programmed_feed_lu_s(&piece),
             length_lu,
+            displacement_lu: contour.curve().map_or(AxisVector::zero(), |curve| curve.end().0 - curve.start().0),
             rotary_only,
             duration_s: piece.law.duration_s(),
             before_tick_s: carry_s,

@@ -1,1 +1,24 @@
-//! placeholder
+//! The cycle: owns the stages, the look-ahead block buffer and the loop.
+//!
+//! In: a [`Machine`](crate::machine::Machine) and a program. Out: per cycle of t_s a [`CycleOutput`] with every wire, at the end the [`RunSummary`].
+//! [`Kernel::cycle`] steps one t_s; a clone of the kernel is a snapshot of its whole state. [`run`] is the loop with threads, pace and
+//! recording around it. Does not print.
+
+mod contour_error;
+mod cycle;
+mod figures;
+mod follow;
+mod preparation;
+mod record;
+mod run;
+mod setpoint_table;
+mod summary;
+mod threads;
+
+pub use cycle::{AxisRow, CycleOutput, Kernel, Status};
+pub use figures::Figures;
+pub use follow::{FollowOptions, FollowOutcome, follow};
+pub use preparation::{PieceSource, Preparation};
+pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
+pub use setpoint_table::SetpointTable;
+pub use summary::{CornerSummary, RunSummary, Warning};

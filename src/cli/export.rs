@@ -1,0 +1,38 @@
+//! `sollwert export`: a recording as CSV.
+
+use super::inputs::refuse_same_file;
+use super::output::{print, show};
+use super::{FOUND_WRONG, UNREADABLE};
+use crate::recorder::{Recording, export as export_recording};
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Args)]
+#[command(after_help = "Example:\n  sollwert export part.mcap -o part.csv")]
+pub(super) struct ExportArguments {
+    /// Recording
+    recording: PathBuf,
+    /// File to write; .csv (.parquet is not built yet)
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+pub(super) fn export(arguments: &ExportArguments) -> Result<(), u8> {
+    refuse_same_file(&arguments.recording, &arguments.output)?;
+    if !arguments.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        let message = format!("`{}` is not a .csv file; other formats are not built yet", arguments.output.display());
+        show([&crate::base::Diagnostic::error("C0002", message).help("give -o a name that ends in .csv")]);
+        return Err(UNREADABLE);
+    }
+    let exported = Recording::open(&arguments.recording).and_then(|recording| export_recording(&recording, &arguments.output));
+    match exported {
+        Ok(report) => {
+            print(&format!("{} rows of {} columns: {}\n", report.rows, report.columns, arguments.output.display()));
+            Ok(())
+        }
+        Err(finding) => {
+            show([&finding]);
+            Err(if arguments.recording.exists() { FOUND_WRONG } else { UNREADABLE })
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! `sollwert moves`: what the interpreter makes of a program.
+
+use super::FOUND_WRONG;
+use super::inputs::{MachineChoice, open_program};
+use super::output::{print, show};
+use crate::base::{AxisKind, units};
+use crate::interpreter::{self, Feed, Interpreter, Move, MoveKind};
+use crate::machine::Machine;
+use clap::Args;
+use serde_json::{Map, Value, json};
+use std::io::Write;
+use std::path::PathBuf;
+
+#[derive(Args)]
+#[command(after_help = "Example:\n  sollwert moves part.mpf -m spinner_mvc850 | head")]
+pub(super) struct MovesArguments {
+    /// NC program
+    program: PathBuf,
+    #[command(flatten)]
+    machine: MachineChoice,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn moves(arguments: &MovesArguments) -> Result<(), u8> {
+    let loaded = arguments.machine.load()?;
+    let program = open_program(&arguments.program)?;
+    let mut interpreter = Interpreter::new(program, &loaded.machine);
+    // Streamed: the program may have ten million blocks. A closed pipe is the reader's way to say "enough".
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut open = true;
+    let mut first = true;
+    if arguments.json {
+        open = out.write_all(b"{\"format\": 1, \"moves\": [").is_ok();
+    }
+    let alarm = loop {
+        match interpreter.next_move() {
+            Ok(Some(next)) if open => {
+                let text = if arguments.json {
+                    let separator = if std::mem::take(&mut first) { "\n " } else { ",\n " };
+                    format!("{separator}{}", json_of(&next, &loaded.machine))
+                } else {
+                    interpreter::format_move(&next, &loaded.machine) + "\n"
+                };
+                open = out.write_all(text.as_bytes()).is_ok();
+            }
+            Ok(_) => break None,
+            Err(alarm) => break Some(alarm),
+        }
+    };
+    let warnings = interpreter.take_warnings();
+    if arguments.json {
+        let listed: Vec<Value> = warnings.iter().map(|finding| json!(crate::kernel::Warning::from(finding))).collect();
+        // Nothing is left to do when the reader has closed the pipe.
+        let _ = writeln!(out, "\n], \"warnings\": {}}}", Value::Array(listed));
+    }
+    let _ = out.flush();
+    drop(out);
+    show(&warnings);
+    match alarm {
+        Some(alarm) => {
+            show([alarm.as_ref()]);
+            Err(FOUND_WRONG)
+        }
+        None => Ok(()),
+    }
+}
+
+fn json_of(next: &Move, machine: &Machine) -> Value {
+    let mut end = Map::new();
+    for id in machine.axis_ids() {
+        let axis = machine.axis(id);
+        let value_lu = next.end.0[id];
+        end.insert(axis.name.clone(), json!(if axis.kind == AxisKind::Rotary { units::deg_from_rad(value_lu) } else { value_lu }));
+    }
+    let mut fields = Map::new();
+    fields.insert("line".into(), json!(next.block.line));
+    fields.insert("block".into(), json!(next.block.number));
+    let kind = match next.kind {
+        MoveKind::Rapid => "rapid",
+        MoveKind::Line => "line",
+        MoveKind::Arc(_) => "arc",
+        MoveKind::Dwell { .. } => "dwell",
+        MoveKind::Function { .. } => "function",
+    };
+    fields.insert("kind".into(), json!(kind));
+    fields.insert("end".into(), Value::Object(end));
+    let feed_mm_min = match next.feed {
+        Feed::Path { feed_lu_s } => json!(units::mm_min_from_mm_s(feed_lu_s)),
+        Feed::Rapid => Value::Null,
+    };
+    fields.insert("feed_mm_min".into(), feed_mm_min);
+    match next.kind {
+        MoveKind::Arc(arc) => {
+            let names: Vec<&str> = arc.plane.iter().map(|id| machine.axis(*id).name.as_str()).collect();
+            fields.insert("plane".into(), json!(names));
+            fields.insert("centre_mm".into(), json!(arc.centre_mm));
+            fields.insert("radius_mm".into(), json!(arc.radius_mm));
+            fields.insert("sweep_deg".into(), json!(units::deg_from_rad(arc.sweep_rad)));
+        }
+        MoveKind::Dwell { time_s } => {
+            fields.insert("time_s".into(), json!(time_s));
+        }
+        _ => {}
+    }
+    Value::Object(fields)
+}

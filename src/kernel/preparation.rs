@@ -1,0 +1,91 @@
+//! Program to planned pieces: the stages that run ahead of the cycle, chained.
+//!
+//! In: a program and a machine. Out: [`PlannedPiece`]s in order, final. How far it is ahead of the cycle is counted in blocks by the
+//! planner, never in time, so that threads change nothing. An alarm of the interpreter stops preparation; everything before it is
+//! planned to rest and handed out first, as on the control.
+
+use crate::base::Diagnostic;
+use crate::feed::{PlannedPiece, Planner};
+use crate::interpreter::Interpreter;
+use crate::kinematics::Kinematics;
+use crate::machine::Machine;
+use crate::program::ProgramSource;
+use crate::smoothing::Smoother;
+
+/// Where the cycle gets its pieces from: preparation itself, or a channel to the thread it runs on.
+pub trait PieceSource {
+    /// The next piece in path order; `None` once the program has ended or an alarm has stopped it.
+    fn next_piece(&mut self) -> Option<PlannedPiece>;
+
+    /// What preparation had to say, complete once `next_piece` has returned `None`.
+    fn take_findings(&mut self) -> Findings;
+}
+
+/// Warnings and the alarm of preparation.
+#[derive(Clone, Debug, Default)]
+pub struct Findings {
+    /// In order of appearance.
+    pub warnings: Vec<Diagnostic>,
+    /// What stopped the program, if anything did.
+    pub alarm: Option<Diagnostic>,
+}
+
+/// Interpreter, smoothing, kinematics and feed in a row.
+#[derive(Clone)]
+pub struct Preparation {
+    interpreter: Interpreter,
+    smoother: Smoother,
+    kinematics: Kinematics,
+    planner: Planner,
+    alarm: Option<Diagnostic>,
+    finished: bool,
+}
+
+impl Preparation {
+    /// At the start of `program`, axes at home.
+    pub fn new(program: ProgramSource, machine: &Machine) -> Self {
+        Self {
+            interpreter: Interpreter::new(program, machine),
+            smoother: Smoother::new(machine),
+            kinematics: Kinematics::new(machine),
+            planner: Planner::new(machine),
+            alarm: None,
+            finished: false,
+        }
+    }
+
+    /// Executes one more block of the program and plans what follows from it.
+    fn extend(&mut self) {
+        let Self { interpreter, smoother, kinematics, planner, .. } = self;
+        match interpreter.next_move() {
+            Ok(Some(next)) => smoother.push(next, &mut |piece| planner.push(kinematics.to_joint(piece))),
+            ended => {
+                self.alarm = ended.err().map(|alarm| *alarm);
+                smoother.finish(&mut |piece| planner.push(kinematics.to_joint(piece)));
+                planner.finish();
+                self.finished = true;
+            }
+        }
+    }
+}
+
+impl PieceSource for Preparation {
+    fn next_piece(&mut self) -> Option<PlannedPiece> {
+        loop {
+            if let Some(piece) = self.planner.pop() {
+                return Some(piece);
+            }
+            if self.finished {
+                return None;
+            }
+            self.extend();
+        }
+    }
+
+    fn take_findings(&mut self) -> Findings {
+        let mut warnings = self.interpreter.take_warnings();
+        warnings.extend(self.smoother.take_warnings());
+        warnings.extend(self.planner.take_warnings());
+        Findings { warnings, alarm: self.alarm.take() }
+    }
+}

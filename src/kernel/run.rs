@@ -1,0 +1,231 @@
+//! The loop around the kernel: threads, recording, pace, progress.
+//!
+//! In: [`RunOptions`]. Out: [`RunOutcome`]; the recording on the disk. Three stages, joined by bounded channels: preparation | cycle |
+//! recorder. `threads` = 1 runs preparation inside the cycle; the result is the same to the byte. Does not print.
+
+use super::cycle::{Kernel, Status};
+use super::preparation::{PieceSource, Preparation};
+use super::record::{record_alarm, record_cycle};
+use super::summary::RunSummary;
+use super::threads::PreparationThread;
+use crate::base::Diagnostic;
+use crate::machine::{Loaded, Machine};
+use crate::program::{OpenedProgram, ProgramId, ProgramSource};
+use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What to run.
+pub struct RunOptions<'a> {
+    /// The machine, as loaded.
+    pub machine: &'a Loaded,
+    /// The main program.
+    pub program: ProgramSource,
+    /// Simulate the drives; otherwise every axis is ideal.
+    pub drives: bool,
+    /// Where to record; `None`: figures only.
+    pub recording: Option<&'a Path>,
+    /// Mantissa bits to keep in the recording; `None`: all.
+    pub mantissa_bits: Option<u8>,
+    /// Signals to record.
+    pub signals: SignalChoice,
+    /// 1: preparation in the cycle's thread; more: in one of its own.
+    pub threads: usize,
+    /// Simulated seconds per second of the wall clock; `None`: as fast as possible.
+    pub pace_ratio: Option<f64>,
+}
+
+/// Where a run stands, for a person who waits.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Simulated time.
+    pub time_s: f64,
+    /// Line of the main program or of a sub-program.
+    pub line: u32,
+    /// Blocks executed.
+    pub blocks: u64,
+}
+
+/// What came of it.
+pub struct RunOutcome {
+    /// Figures at the border, warnings and alarm included.
+    pub summary: RunSummary,
+    /// Warnings in order.
+    pub warnings: Vec<Diagnostic>,
+    /// What ended the program early.
+    pub alarm: Option<Diagnostic>,
+    /// Cycles that began late under `pace_ratio`, and how late the latest was.
+    pub deadlines: Option<Deadlines>,
+    /// The recording.
+    pub recording: Option<RecordingSummary>,
+}
+
+/// Real-time behaviour of a paced run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deadlines {
+    /// Cycles that began later than one t_s after their time.
+    pub missed: u64,
+    /// Latest start.
+    pub latest_s: f64,
+}
+
+/// A run that could not be made (exit 2): the recording cannot be written, no thread to be had.
+#[derive(Debug)]
+pub struct RunError(pub Diagnostic);
+
+/// Runs `options.program` to its end.
+pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Result<RunOutcome, RunError> {
+    let machine = Arc::new(options.machine.machine.clone());
+    let preparation = Preparation::new(options.program.clone(), &machine);
+    if options.threads > 1 {
+        let source = PreparationThread::spawn(preparation)
+            .map_err(|error| RunError(Diagnostic::error("K0001", format!("no thread for preparation: {error}"))))?;
+        drive_loop(Kernel::with_source(machine, source, options.drives), options, progress)
+    } else {
+        drive_loop(Kernel::with_source(machine, preparation, options.drives), options, progress)
+    }
+}
+
+fn drive_loop<S: PieceSource>(
+    mut kernel: Kernel<S>,
+    options: RunOptions<'_>,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<RunOutcome, RunError> {
+    let machine = kernel.machine().clone();
+    let mut recorder = open_recorder(&options, &machine)?;
+    let mut pacer = options.pace_ratio.map(|ratio| Pacer::new(ratio, &machine));
+    let mut drive_alarm = None;
+    loop {
+        match kernel.cycle() {
+            Ok(Status::Running) => {}
+            Ok(Status::Finished) => break,
+            Err(alarm) => {
+                drive_alarm = Some(alarm);
+                break;
+            }
+        }
+        if let Some(pacer) = &mut pacer {
+            pacer.wait();
+        }
+        let output = kernel.output();
+        if let Some(recorder) = &mut recorder {
+            record_cycle(recorder, &machine, output).map_err(RunError)?;
+        }
+        if let Some(setpoint) = output.setpoint.filter(|setpoint| setpoint.tick.0.is_multiple_of(PROGRESS_TICKS)) {
+            progress(Progress {
+                time_s: machine.cycle.time_base.time_s(setpoint.tick),
+                line: setpoint.path.block.line,
+                blocks: kernel.figures().blocks,
+            });
+        }
+    }
+    conclude(kernel, &options, drive_alarm, recorder, pacer.map(|pacer| pacer.deadlines))
+}
+
+/// Progress is offered at every multiple of this many ticks; the receiver decides how often it draws.
+const PROGRESS_TICKS: u64 = 4096;
+
+fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Option<Recorder>, RunError> {
+    let Some(path) = options.recording else { return Ok(None) };
+    let main = OpenedProgram {
+        id: ProgramId(0),
+        name: options.program.name().into(),
+        bytes: options.program.bytes().clone(),
+    };
+    let programs = std::slice::from_ref(&main);
+    let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, programs);
+    setup.mantissa_bits = options.mantissa_bits;
+    setup.signals = options.signals.clone();
+    Recorder::to_file(path, &setup).map(Some).map_err(RunError)
+}
+
+/// Findings, figures, and the end of the recording.
+fn conclude<S: PieceSource>(
+    mut kernel: Kernel<S>,
+    options: &RunOptions<'_>,
+    drive_alarm: Option<Diagnostic>,
+    recorder: Option<Recorder>,
+    deadlines: Option<Deadlines>,
+) -> Result<RunOutcome, RunError> {
+    let machine = kernel.machine().clone();
+    let findings = kernel.take_findings();
+    let mut warnings = options.machine.warnings.clone();
+    warnings.extend(drive_warnings(&machine, options.drives));
+    warnings.extend(findings.warnings);
+    if kernel.figures().exact_stops > 0 {
+        let message = "an exact stop ends when its set-point arrives: waiting until the axes are in position is not simulated yet";
+        warnings.push(Diagnostic::warning("K0002", message));
+    }
+    let alarm = drive_alarm.or(findings.alarm);
+    let mut summary = RunSummary::new(&machine, options.program.name(), kernel.figures(), options.drives);
+    summary.add_warnings(&warnings);
+    if let Some(alarm) = &alarm {
+        summary.set_alarm(alarm);
+    }
+    let recording = match recorder {
+        None => None,
+        Some(mut recorder) => {
+            if let Some(alarm) = &alarm {
+                let tick = machine.cycle.time_base.setpoint_tick(kernel.figures().setpoints);
+                record_alarm(&mut recorder, tick, alarm);
+            }
+            let document = serde_json::to_string(&summary)
+                .map_err(|error| RunError(Diagnostic::error("K0003", format!("figures do not serialise: {error}"))))?;
+            Some(recorder.finish(&document).map_err(RunError)?)
+        }
+    };
+    Ok(RunOutcome { summary, warnings, alarm, deadlines, recording })
+}
+
+/// One warning for all axes whose drives are representative, one for all that are ideal.
+pub(super) fn drive_warnings(machine: &Machine, drives: bool) -> Vec<Diagnostic> {
+    let names = |wanted: &dyn Fn(&crate::machine::Axis) -> bool| -> Vec<&str> {
+        machine.axes.iter().filter(|axis| wanted(axis)).map(|axis| axis.name.as_str()).collect()
+    };
+    let mut warnings = Vec::new();
+    if !drives {
+        return warnings;
+    }
+    let representative = names(&|axis| axis.drive.as_ref().is_some_and(|drive| !drive.identified));
+    if !representative.is_empty() {
+        let message = format!(
+            "representative drive: the drive data of {} are not identified on a real machine, so that deviations, following errors and currents show the class of machine, not this one",
+            representative.join(", ")
+        );
+        warnings.push(Diagnostic::warning("D0002", message));
+    }
+    let ideal = names(&|axis| axis.drive.is_none());
+    if !ideal.is_empty() {
+        let message = format!("ideal axis: {} without drive data: actual = set-point", ideal.join(", "));
+        warnings.push(Diagnostic::warning("D0003", message));
+    }
+    warnings
+}
+
+/// Holds the loop to the wall clock.
+struct Pacer {
+    start: Instant,
+    cycle_s: f64,
+    cycles: u64,
+    deadlines: Deadlines,
+}
+
+impl Pacer {
+    fn new(pace_ratio: f64, machine: &Machine) -> Self {
+        let cycle_s = machine.cycle.time_base.setpoint_period_s() / pace_ratio;
+        Self { start: Instant::now(), cycle_s, cycles: 0, deadlines: Deadlines::default() }
+    }
+
+    fn wait(&mut self) {
+        let due_s = self.cycles as f64 * self.cycle_s;
+        let late_s = self.start.elapsed().as_secs_f64() - due_s;
+        if late_s < 0.0 {
+            std::thread::sleep(Duration::from_secs_f64(-late_s));
+        } else if late_s > self.cycle_s {
+            self.deadlines.missed += 1;
+        }
+        self.deadlines.latest_s = self.deadlines.latest_s.max(late_s);
+        self.cycles += 1;
+    }
+}

@@ -1,0 +1,83 @@
+//! Preparation on a thread of its own, joined to the cycle by a bounded channel of batches.
+//!
+//! In: a [`Preparation`]. Out: a [`PieceSource`] that gives the same pieces in the same order. The channel's length only decides how
+//! much memory is used and who waits: what is planned does not depend on it.
+
+use super::preparation::{Findings, PieceSource, Preparation};
+use crate::feed::PlannedPiece;
+use crossbeam_channel::{Receiver, bounded};
+use std::collections::VecDeque;
+use std::thread::JoinHandle;
+
+/// Pieces a message: enough that the channel is not the cost.
+const BATCH_PIECES: usize = 64;
+/// Messages in flight.
+const BATCHES: usize = 16;
+
+enum Message {
+    Pieces(Vec<PlannedPiece>),
+    Ended(Findings),
+}
+
+/// The receiving end.
+pub(super) struct PreparationThread {
+    messages: Option<Receiver<Message>>,
+    ready: VecDeque<PlannedPiece>,
+    findings: Findings,
+    worker: Option<JoinHandle<()>>,
+}
+
+impl PreparationThread {
+    /// Moves `preparation` to a new thread. Errors if the system gives no thread.
+    pub(super) fn spawn(mut preparation: Preparation) -> std::io::Result<Self> {
+        let (send, messages) = bounded(BATCHES);
+        let worker = std::thread::Builder::new().name("preparation".into()).spawn(move || {
+            let mut ended = false;
+            while !ended {
+                let mut batch = Vec::with_capacity(BATCH_PIECES);
+                while batch.len() < BATCH_PIECES && !ended {
+                    match preparation.next_piece() {
+                        Some(piece) => batch.push(piece),
+                        None => ended = true,
+                    }
+                }
+                // A closed channel means that the cycle has given up (a drive alarm): stop preparing.
+                if send.send(Message::Pieces(batch)).is_err() {
+                    return;
+                }
+            }
+            let _ = send.send(Message::Ended(preparation.take_findings()));
+        })?;
+        Ok(Self { messages: Some(messages), ready: VecDeque::new(), findings: Findings::default(), worker: Some(worker) })
+    }
+}
+
+impl PieceSource for PreparationThread {
+    fn next_piece(&mut self) -> Option<PlannedPiece> {
+        while self.ready.is_empty() {
+            match self.messages.as_ref()?.recv() {
+                Ok(Message::Pieces(batch)) => self.ready.extend(batch),
+                Ok(Message::Ended(findings)) => {
+                    self.findings = findings;
+                    self.messages = None;
+                }
+                Err(_) => self.messages = None,
+            }
+        }
+        self.ready.pop_front()
+    }
+
+    fn take_findings(&mut self) -> Findings {
+        std::mem::take(&mut self.findings)
+    }
+}
+
+impl Drop for PreparationThread {
+    fn drop(&mut self) {
+        self.messages = None;
+        if let Some(worker) = self.worker.take() {
+            // A panic in preparation was printed by its own thread; here it must not become a second one.
+            let _ = worker.join();
+        }
+    }
+}
