@@ -1,6 +1,6 @@
 //! models/drive.md section 7, numbers 1 to 4, 6 and 8.
 
-use crate::rig::{self, Rig, input, machines};
+use crate::rig::{Rig, input, machines};
 use sollwert::drive::flags;
 use std::f64::consts::TAU;
 
@@ -49,15 +49,18 @@ fn form_2_acceleration_lag() {
             let a = 0.8 * rig.data.speed_setpoint_max_lu_s / duration_s;
             let last = rig.follow(duration_s, |t_s| 0.5 * a * t_s * t_s).pop().expect("signals");
             let data = &rig.data;
-            let friction_s = data.mechanics.viscous_friction_n_m_s_per_rad * data.speed_reset_time_s
-                / data.speed_gain_n_m_s_per_rad;
+            let friction_s =
+                data.mechanics.viscous_friction_n_m_s_per_rad * data.speed_reset_time_s / data.speed_gain_n_m_s_per_rad;
             let lag_s = rig.position_period_s() - rig.speed_period_s() / 2.0 + friction_s - setpoint_delay_s
                 + feedforward_delay_s;
             let expected_lu = a * lag_s / data.position_gain_per_s;
             // x_set is rounded at 1e-14 of its size (160 lu after 1 s), and that is divided by T_p Kv: some 1e-9 of a T_p / Kv.
             let scale_lu = a * rig.position_period_s() / data.position_gain_per_s;
             let error_share = (last.control_deviation_lu - expected_lu).abs() / scale_lu;
-            assert!(error_share < 3e-9, "{name}, d_pos {setpoint_delay_s}, d_ff {feedforward_delay_s}: {error_share:e}");
+            assert!(
+                error_share < 3e-9,
+                "{name}, d_pos {setpoint_delay_s}, d_ff {feedforward_delay_s}: {error_share:e}"
+            );
         }
     }
 }
@@ -78,8 +81,10 @@ fn form_3_delay_is_feedforward() {
             let traded =
                 rig.clone().with(|data| data.velocity_feedforward_ratio = 0.9 - data.position_gain_per_s * delay_s);
             let (delayed, traded) = (delayed.follow(1.0, motion), traded.follow(1.0, motion));
-            let apart_lu = largest(delayed.iter().zip(&traded).map(|(a, b)| a.position_actual_lu - b.position_actual_lu));
-            let shown_lu = largest(delayed.iter().zip(&traded).map(|(a, b)| a.control_deviation_lu - b.control_deviation_lu));
+            let apart_lu =
+                largest(delayed.iter().zip(&traded).map(|(a, b)| a.position_actual_lu - b.position_actual_lu));
+            let shown_lu =
+                largest(delayed.iter().zip(&traded).map(|(a, b)| a.control_deviation_lu - b.control_deviation_lu));
             // Rounding of x_set differences over T_p, fed through both routes: 1e-12 of the travel.
             assert!(apart_lu < 1e-11 * amplitude_lu, "{name}, {delay_share} T_p: motions differ by {apart_lu:e}");
             assert!(shown_lu > 1e-4 * amplitude_lu, "{name}: the deviation must tell the two apart");
@@ -125,7 +130,8 @@ fn form_6_quadrant_glitch() {
             data.velocity_feedforward_ratio = 1.0;
         });
         let data = &rig.data;
-        let bound_lu = 2.0 * data.mechanics.coulomb_friction_n_m * data.speed_reset_time_s / data.speed_gain_n_m_s_per_rad
+        let bound_lu = 2.0 * data.mechanics.coulomb_friction_n_m * data.speed_reset_time_s
+            / data.speed_gain_n_m_s_per_rad
             * data.mechanics.transmission_lu_per_rad.abs();
         let amplitude_lu = 0.05 * data.speed_setpoint_max_lu_s;
         let motion = |t_s: f64| amplitude_lu * (1.0 - (TAU * 1.5 * t_s).cos());

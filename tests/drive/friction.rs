@@ -56,8 +56,7 @@ fn a_cold_vertical_axis_holds_if_friction_holds_it() {
 fn stick_slip_without_chatter() {
     let rig = mvc_y().friction(1.2, 2.4);
     let signals = rig.run_each((0..3000).map(|k| input(if k == 0 { 0.0 } else { 0.01 })));
-    let breakaways =
-        signals.windows(2).filter(|two| two[0].flags & flags::STUCK > two[1].flags & flags::STUCK).count();
+    let breakaways = signals.windows(2).filter(|two| two[0].flags & flags::STUCK > two[1].flags & flags::STUCK).count();
     let moving: Vec<f64> = signals.iter().map(|s| s.motor_speed_rad_s).filter(|w| *w != 0.0).collect();
     let sign_changes = moving.windows(2).filter(|two| two[0] * two[1] < 0.0).count();
     // A charge of the integrator takes at least Tn (Ts - Tc) / (Kp w_ref) with w_ref = Kv 0.01 mm / r.

@@ -41,8 +41,7 @@ fn saturation_recovers_without_windup() {
 fn a_load_above_the_current_limit_does_not_wind_up() {
     let rig = mvc_x().with(|data| data.current_max_a = 5.0);
     let loaded = |k: u32| (100..600).contains(&k);
-    let signals = rig
-        .run((0..2000).map(|k| DriveInput { load_n_m: if loaded(k) { 7.2 } else { 0.0 }, ..input(0.0) }));
+    let signals = rig.run((0..2000).map(|k| DriveInput { load_n_m: if loaded(k) { 7.2 } else { 0.0 }, ..input(0.0) }));
     assert!(signals[599].position_actual_lu < -1.0, "6.5 N m cannot hold 7.2 with 0.6 of friction");
     assert_eq!(signals[599].flags & flags::CURRENT_LIMIT, flags::CURRENT_LIMIT);
     assert!((signals[300].gravity_torque_n_m - 7.2).abs() < 1e-15, "gravity includes the load");
@@ -189,6 +188,41 @@ fn divergence_is_seen() {
     for _ in 0..1000 {
         drive.step(input(1.0));
         assert!(drive.is_finite());
+    }
+}
+
+/// Any positive data, sane or not: no panic, no endless search, and either numbers or a drive that says it has none.
+#[test]
+fn wild_parameters_neither_panic_nor_hang() {
+    for seed in 0..400 {
+        let mut random = Random(seed);
+        let mut wild = |middle: f64| middle * 10_f64.powf(4.0 * random.signed());
+        let rig = mvc_x().with(|data| {
+            data.position_gain_per_s = wild(50.0);
+            data.speed_gain_n_m_s_per_rad = wild(2.0);
+            data.speed_reset_time_s = wild(0.01);
+            data.current_gain_v_per_a = wild(20.0);
+            data.current_reset_time_s = wild(0.002);
+            data.current_max_a = wild(30.0);
+            data.voltage_max_v = wild(200.0);
+            data.motor.resistance_ohm = wild(1.0);
+            data.motor.inductance_h = wild(5e-3);
+            data.motor.back_emf_v_s_per_rad = wild(0.4);
+            data.motor.torque_constant_n_m_per_a = wild(1.2);
+            data.mechanics.inertia_kg_m2 = wild(0.01);
+            data.mechanics.coulomb_friction_n_m = wild(1.0);
+            data.mechanics.breakaway_friction_n_m = data.mechanics.coulomb_friction_n_m * (1.0 + wild(0.1));
+            data.mechanics.gravity_n_m = wild(1.0);
+            data.setpoint_delay_s = wild(1e-3);
+        });
+        let mut drive = rig.cold().drive(0.0);
+        let mut setpoint_lu = 0.0;
+        for k in 0..200 {
+            setpoint_lu += if k % 50 < 25 { wild(1e-3) } else { 0.0 };
+            let s = drive.step(input(setpoint_lu));
+            let numbers = s.position_actual_lu.is_finite() && s.current_a.is_finite() && s.voltage_v.is_finite();
+            assert!(numbers || !drive.is_finite(), "seed {seed}, k {k}: {s:?}");
+        }
     }
 }
 

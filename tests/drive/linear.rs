@@ -123,7 +123,8 @@ fn continuous_lu(rig: &Rig, duration_s: f64, setpoint_lu: impl Fn(f64) -> f64) -
         let u = data.current_gain_v_per_a * i_error + ii;
         [
             (u - motor.resistance_ohm * i - motor.back_emf_v_s_per_rad * w) / motor.inductance_h,
-            (motor.torque_constant_n_m_per_a * i - mechanics.viscous_friction_n_m_s_per_rad * w) / mechanics.inertia_kg_m2,
+            (motor.torque_constant_n_m_per_a * i - mechanics.viscous_friction_n_m_s_per_rad * w)
+                / mechanics.inertia_kg_m2,
             w,
             data.speed_gain_n_m_s_per_rad / data.speed_reset_time_s * w_error,
             data.current_gain_v_per_a / data.current_reset_time_s * i_error,
