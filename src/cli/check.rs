@@ -33,11 +33,16 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<(), u8> {
             findings.iter().filter(|finding| finding.severity == wanted).map(Warning::from).collect()
         };
         print_json(&json!({
-            "format": 1, "program": program.name(), "machine": machine.machine.name,
+            "format": 1, "program": program.file_name(), "machine": machine.machine.name,
             "errors": of(Severity::Error), "warnings": of(Severity::Warning), "notes": of(Severity::Note),
         }));
     } else {
-        print(&format!("{}: {}, {}\n", program.name(), count(errors, "error"), count(findings.len() - errors, "warning")));
+        print(&format!(
+            "{}: {}, {}\n",
+            program.file_name(),
+            count(errors, "error"),
+            count(findings.len() - errors, "warning")
+        ));
     }
     if errors > 0 { Err(FOUND_WRONG) } else { Ok(()) }
 }

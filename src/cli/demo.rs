@@ -20,6 +20,9 @@ pub(super) struct DemoArguments {
     /// Where to write; made if it does not exist. Files of the same names there are left alone
     #[arg(long, default_value = "sollwert-demo")]
     folder: PathBuf,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn demo(arguments: &DemoArguments) -> Result<(), u8> {
@@ -56,7 +59,10 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<(), u8> {
         show([&error.0]);
         UNREADABLE
     })?;
-    report(&outcome, Some(&recording), &Style { json: false, drives: true })?;
+    report(&outcome, Some(&recording), &Style { json: arguments.json, drives: true })?;
+    if arguments.json {
+        return Ok(());
+    }
     print(&format!(
         "\nNow change {} or {} and run again:\n  sollwert run {} -m {} -o {}\n  sollwert export {} -o spline.csv\n",
         program_path.display(),

@@ -1,10 +1,11 @@
 //! `sollwert export`: a recording as CSV.
 
 use super::inputs::refuse_same_file;
-use super::output::{print, show};
+use super::output::{print, print_json, show};
 use super::{FOUND_WRONG, UNREADABLE};
-use crate::recorder::{Recording, export as export_recording};
+use crate::recorder::{ExportReport, Recording, export as export_recording};
 use clap::Args;
+use serde_json::json;
 use std::path::PathBuf;
 
 #[derive(Args)]
@@ -15,6 +16,9 @@ pub(super) struct ExportArguments {
     /// File to write; .csv (.parquet is not built yet)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// One JSON document on stdout
+    #[arg(long)]
+    json: bool,
 }
 
 pub(super) fn export(arguments: &ExportArguments) -> Result<(), u8> {
@@ -24,10 +28,19 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<(), u8> {
         show([&crate::base::Diagnostic::error("C0002", message).help("give -o a name that ends in .csv")]);
         return Err(UNREADABLE);
     }
-    let exported = Recording::open(&arguments.recording).and_then(|recording| export_recording(&recording, &arguments.output));
+    let exported =
+        Recording::open(&arguments.recording).and_then(|recording| export_recording(&recording, &arguments.output));
     match exported {
         Ok(report) => {
-            print(&format!("{} rows of {} columns: {}\n", report.rows, report.columns, arguments.output.display()));
+            let output = arguments.output.display();
+            if arguments.json {
+                let ExportReport { rows, columns, bytes } = report;
+                print_json(
+                    &json!({"format": 1, "output": output.to_string(), "rows": rows, "columns": columns, "bytes": bytes}),
+                );
+            } else {
+                print(&format!("{} rows of {} columns: {output}\n", report.rows, report.columns));
+            }
             Ok(())
         }
         Err(finding) => {

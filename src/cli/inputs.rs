@@ -26,7 +26,8 @@ impl MachineChoice {
             Some(name) => name.as_str(),
             None => {
                 let note = format!("no machine given: the three-axis machine `{DEFAULT_MACHINE}` is used");
-                show([&Diagnostic::note("M0000", note).help("name one with -m; `sollwert machine list` shows the shipped ones")]);
+                show([&Diagnostic::note("M0000", note)
+                    .help("name one with -m; `sollwert machine list` shows the shipped ones")]);
                 DEFAULT_MACHINE
             }
         };

@@ -146,10 +146,13 @@ fn list(as_json: bool) -> Result<(), u8> {
         }
     }
     if as_json {
-        let list: Vec<_> = rows.iter().map(|(name, title, axes)| json!({"name": name, "title": title, "axes": axes})).collect();
+        let list: Vec<_> =
+            rows.iter().map(|(name, title, axes)| json!({"name": name, "title": title, "axes": axes})).collect();
         print_json(&json!({"format": 1, "machines": list}));
     } else {
-        print(&table(&rows.into_iter().map(|(name, title, axes)| vec![name.to_owned(), title, axes]).collect::<Vec<_>>()));
+        print(&table(
+            &rows.into_iter().map(|(name, title, axes)| vec![name.to_owned(), title, axes]).collect::<Vec<_>>(),
+        ));
     }
     Ok(())
 }

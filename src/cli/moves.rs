@@ -2,7 +2,7 @@
 
 use super::FOUND_WRONG;
 use super::inputs::{MachineChoice, open_program};
-use super::output::{print, show};
+use super::output::show;
 use crate::base::{AxisKind, units};
 use crate::interpreter::{self, Feed, Interpreter, Move, MoveKind};
 use crate::machine::Machine;
@@ -72,7 +72,10 @@ fn json_of(next: &Move, machine: &Machine) -> Value {
     for id in machine.axis_ids() {
         let axis = machine.axis(id);
         let value_lu = next.end.0[id];
-        end.insert(axis.name.clone(), json!(if axis.kind == AxisKind::Rotary { units::deg_from_rad(value_lu) } else { value_lu }));
+        end.insert(
+            axis.name.clone(),
+            json!(if axis.kind == AxisKind::Rotary { units::deg_from_rad(value_lu) } else { value_lu }),
+        );
     }
     let mut fields = Map::new();
     fields.insert("line".into(), json!(next.block.line));

@@ -112,7 +112,12 @@ pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &
     } else {
         print(&figures_text(&outcome.summary, style));
         if let (Some(path), Some(recorded)) = (recording, &outcome.recording) {
-            print(&format!("\nrecorded {} messages, {:.1} MB: {}\n", recorded.messages, recorded.bytes as f64 / 1e6, path.display()));
+            print(&format!(
+                "\nrecorded {} messages, {:.1} MB: {}\n",
+                recorded.messages,
+                recorded.bytes as f64 / 1e6,
+                path.display()
+            ));
         }
     }
     if outcome.alarm.is_some() { Err(FOUND_WRONG) } else { Ok(()) }
@@ -146,7 +151,8 @@ pub(super) fn figures_text(summary: &RunSummary, style: &Style) -> String {
     let mut text = format!("{} on {}\n\n{}", summary.program, summary.machine, table(&rows));
     let mut limits: Vec<(&String, &f64)> = summary.limits.iter().collect();
     limits.sort_by(|a, b| b.1.total_cmp(a.1));
-    let limits: Vec<Vec<String>> = limits.into_iter().map(|(name, share)| vec![name.clone(), percent(*share)]).collect();
+    let limits: Vec<Vec<String>> =
+        limits.into_iter().map(|(name, share)| vec![name.clone(), percent(*share)]).collect();
     text += &format!("\nwhat limits the feed (share of the cycle time)\n{}", table(&limits));
     text += &format!("\naxes{}\n{}", representative_mark(summary), axes_table(summary, style.drives));
     text
@@ -173,7 +179,9 @@ fn axes_table(summary: &RunSummary, drives: bool) -> String {
         };
         let mut row = vec![name.clone(), show("velocity_max_", 2), show("acceleration_max_", 1), show("jerk_max_", 0)];
         if drives {
-            for prefix in ["control_deviation_max_", "control_deviation_rms_", "following_error_max_", "following_error_rms_"] {
+            for prefix in
+                ["control_deviation_max_", "control_deviation_rms_", "following_error_max_", "following_error_rms_"]
+            {
                 row.push(show(prefix, 5));
             }
         }

@@ -69,7 +69,8 @@ fn one(path: &Path, machine: &Loaded, threads: u16) -> Result<RunOutcome, u8> {
         pace_ratio: None,
     };
     let mut line = ProgressLine::new();
-    let outcome = kernel::run(options, &mut |at| line.update(|| format!("{:.1} s simulated, {} blocks", at.time_s, at.blocks)));
+    let outcome =
+        kernel::run(options, &mut |at| line.update(|| format!("{:.1} s simulated, {} blocks", at.time_s, at.blocks)));
     outcome.map_err(|error| {
         let finding: &Diagnostic = &error.0;
         show([finding]);

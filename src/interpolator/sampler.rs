@@ -155,6 +155,7 @@ impl Interpolator {
                 self.path_length_mm += active.length_lu;
             }
         }
+        let programmed_feed_lu_s = programmed_feed_lu_s(&piece);
         let contour = &mut piece.path.contour;
         let events = std::mem::take(&mut contour.events);
         let corner = match &contour.kind {
@@ -171,7 +172,7 @@ impl Interpolator {
             events,
             corner,
             entry_feed_lu_s: piece.law.at(0.0).velocity_lu_s,
-            programmed_feed_lu_s: programmed_feed_lu_s(&piece),
+            programmed_feed_lu_s,
             length_lu,
             displacement_lu: contour.curve().map_or(AxisVector::zero(), |curve| curve.end().0 - curve.start().0),
             rotary_only,

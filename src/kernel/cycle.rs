@@ -39,7 +39,7 @@ pub struct AxisRow {
 }
 
 /// Everything that one cycle of t_s produced.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct CycleOutput {
     /// The set-point of this cycle; `None` before the first one.
     pub setpoint: Option<Setpoint>,
@@ -109,7 +109,19 @@ impl<S: PieceSource> Kernel<S> {
     /// As [`Kernel::new`], with preparation wherever it runs.
     pub fn with_source(machine: Arc<Machine>, source: S, drives: bool) -> Self {
         let time_base = machine.cycle.time_base;
-        let drives = machine
+        let kinematics = Kinematics::new(&machine);
+        let home =
+            MachinePoint(PerAxis::from_fn(|axis| machine.axes.get(axis.index()).map_or(0.0, |axis| axis.home_lu)));
+        let tool = kinematics.tool_pose(&home);
+        let output = CycleOutput {
+            setpoint: None,
+            begun: Vec::new(),
+            rows: Vec::new(),
+            tool_setpoint: tool,
+            tool_actual: tool,
+            contour_error_mm: 0.0,
+        };
+        let stages: Vec<Drive> = machine
             .axes
             .iter()
             .map(|axis| match drives {
@@ -125,12 +137,12 @@ impl<S: PieceSource> Kernel<S> {
             interpolator: Interpolator::new(&machine),
             position_cycles,
             row_ticks,
-            drives,
-            kinematics: Kinematics::new(&machine),
+            drives: stages,
+            kinematics,
             contour_error: ContourErrorMeter::new(),
             figures: Figures::new(&machine),
             ahead: Sampled::default(),
-            output: CycleOutput::default(),
+            output,
             next_setpoint: 0,
             machine,
         }
@@ -203,7 +215,8 @@ impl<S: PieceSource> Kernel<S> {
         self.output.tool_setpoint = self.kinematics.tool_pose(&sent);
         self.output.tool_actual = self.kinematics.tool_pose(&actual);
         self.contour_error.push(self.output.tool_setpoint.position_mm);
-        self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm).unwrap_or(0.0);
+        self.output.contour_error_mm =
+            self.contour_error.distance_mm(self.output.tool_actual.position_mm).unwrap_or(0.0);
     }
 
     /// What the last cycle produced.
@@ -231,6 +244,9 @@ impl<S: PieceSource> Kernel<S> {
 pub(super) fn diverged(machine: &Machine, axis: AxisId, tick: Tick) -> Diagnostic {
     let name = &machine.axis(axis).name;
     let time_s = machine.cycle.time_base.time_s(tick);
-    Diagnostic::error("D0001", format!("axis {name} has left all bounds at {time_s:.4} s: its control loop is unstable"))
-        .help(format!("lower axes.{name}.drive.speed_gain_n_m_s_per_rad, current_gain_v_per_a or position_gain_per_s"))
+    Diagnostic::error(
+        "D0001",
+        format!("axis {name} has left all bounds at {time_s:.4} s: its control loop is unstable"),
+    )
+    .help(format!("lower axes.{name}.drive.speed_gain_n_m_s_per_rad, current_gain_v_per_a or position_gain_per_s"))
 }

@@ -109,7 +109,8 @@ impl Figures {
     /// Counts a piece that begins.
     pub(super) fn piece(&mut self, begun: &Begun) {
         self.blocks += u64::from(begun.blocks_begun);
-        self.exact_stops += u64::from(begun.stop_at_end && begun.path_mode == PathMode::ExactStop && begun.length_lu > 0.0);
+        self.exact_stops +=
+            u64::from(begun.stop_at_end && begun.path_mode == PathMode::ExactStop && begun.length_lu > 0.0);
         if !begun.rotary_only {
             self.path_length_mm += begun.length_lu;
         }

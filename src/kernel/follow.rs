@@ -97,7 +97,13 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
     Ok(FollowOutcome { rows, summary, warnings, alarm })
 }
 
-fn summary(machine: &Machine, figures: &Figures, rows: usize, warnings: &[Diagnostic], alarm: Option<&Diagnostic>) -> Value {
+fn summary(
+    machine: &Machine,
+    figures: &Figures,
+    rows: usize,
+    warnings: &[Diagnostic],
+    alarm: Option<&Diagnostic>,
+) -> Value {
     let list: Vec<Warning> = warnings.iter().map(Warning::from).collect();
     let mut document = json!({
         "format": 1,
@@ -165,7 +171,11 @@ impl<'a> Follower<'a> {
             let setpoint = differentiate(&self.setpoints[axis], self.sent[axis], period_s, row == 0);
             let load_n_m = table.loads.iter().find(|(loaded, _)| *loaded == axis).map_or(0.0, |(_, loads)| loads[row]);
             let drive = &mut self.drives[axis.index()];
-            let signals = drive.step(DriveInput { position_setpoint_lu: setpoint.position_lu, load_n_m, feedforward_active: true });
+            let signals = drive.step(DriveInput {
+                position_setpoint_lu: setpoint.position_lu,
+                load_n_m,
+                feedforward_active: true,
+            });
             if !drive.is_finite() {
                 return Err(diverged(machine, axis, tick));
             }

@@ -42,7 +42,12 @@ pub(super) fn record_cycle(recorder: &mut Recorder, machine: &Machine, output: &
 }
 
 /// Records one row of `follow`.
-pub(super) fn record_follow(recorder: &mut Recorder, time_base: &TimeBase, row_ticks: u64, row: &FollowRow<'_>) -> Result<(), Diagnostic> {
+pub(super) fn record_follow(
+    recorder: &mut Recorder,
+    time_base: &TimeBase,
+    row_ticks: u64,
+    row: &FollowRow<'_>,
+) -> Result<(), Diagnostic> {
     record_poses(recorder, time_base, row.tick, row_ticks, row.tools);
     record_rows(recorder, row.rows);
     recorder.check()
@@ -60,7 +65,13 @@ fn record_rows(recorder: &mut Recorder, rows: &[AxisRow]) {
 }
 
 /// Poses at the first cycle in every 10 ms of simulated time.
-fn record_poses(recorder: &mut Recorder, time_base: &TimeBase, tick: Tick, cycle_ticks: u64, [sent, actual]: [Pose; 2]) {
+fn record_poses(
+    recorder: &mut Recorder,
+    time_base: &TimeBase,
+    tick: Tick,
+    cycle_ticks: u64,
+    [sent, actual]: [Pose; 2],
+) {
     let period = |tick: Tick| time_base.time_ns(tick) / POSE_PERIOD_NS;
     if tick.0 > 0 && period(tick) == period(Tick(tick.0.saturating_sub(cycle_ticks))) {
         return;

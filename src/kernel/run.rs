@@ -130,7 +130,7 @@ fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Opt
     let Some(path) = options.recording else { return Ok(None) };
     let main = OpenedProgram {
         id: ProgramId(0),
-        name: options.program.name().into(),
+        name: options.program.file_name().into(),
         bytes: options.program.bytes().clone(),
     };
     let programs = std::slice::from_ref(&main);
@@ -158,7 +158,7 @@ fn conclude<S: PieceSource>(
         warnings.push(Diagnostic::warning("K0002", message));
     }
     let alarm = drive_alarm.or(findings.alarm);
-    let mut summary = RunSummary::new(&machine, options.program.name(), kernel.figures(), options.drives);
+    let mut summary = RunSummary::new(&machine, options.program.file_name(), kernel.figures(), options.drives);
     summary.add_warnings(&warnings);
     if let Some(alarm) = &alarm {
         summary.set_alarm(alarm);

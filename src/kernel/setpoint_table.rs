@@ -25,7 +25,8 @@ const PERIOD_TOLERANCE: f64 = 1e-3;
 impl SetpointTable {
     /// Reads the CSV. Errors mark the line: unknown column, not a number, time steps that are not the position cycle.
     pub fn from_csv(source: &SourceText, machine: &Machine) -> Result<Self, Diagnostic> {
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source.text.as_bytes());
+        let mut reader =
+            csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source.text.as_bytes());
         let header = reader.headers().map_err(|error| unreadable(source, &error))?.clone();
         let columns = columns(source, &header, machine)?;
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
@@ -66,7 +67,8 @@ impl SetpointTable {
         }
         for message in recording.messages()? {
             let message = message?;
-            if let (Some(place), Content::Axis(sample), Some(field)) = (by_topic[message.topic], &message.content, field)
+            if let (Some(place), Content::Axis(sample), Some(field)) =
+                (by_topic[message.topic], &message.content, field)
                 && let Some(value) = sample.get(field)
             {
                 let (_, scale_ratio, values) = &mut samples[place];
@@ -115,7 +117,10 @@ impl SetpointTable {
     ) -> Result<Self, Diagnostic> {
         let mut table = Self { positions: Vec::new(), loads: Vec::new(), rows: values.first().map_or(0, Vec::len) };
         if table.rows == 0 {
-            return Err(Diagnostic::error("F0001", format!("`{}` has no rows: there is nothing to follow", source.name)));
+            return Err(Diagnostic::error(
+                "F0001",
+                format!("`{}` has no rows: there is nothing to follow", source.name),
+            ));
         }
         for (column, mut values) in columns.iter().zip(values) {
             match *column {
@@ -167,7 +172,8 @@ fn columns(source: &SourceText, header: &csv::StringRecord, machine: &Machine) -
             let from = source.text.find(name).unwrap_or(0);
             let place = |label: &str| source.place(from..from + name.len(), label);
             let Some(at) = known.iter().position(|known| known.eq_ignore_ascii_case(name)) else {
-                let finding = Diagnostic::error("F0005", format!("unknown column `{name}`")).at(place("expected time_s, an axis or a load"));
+                let finding = Diagnostic::error("F0005", format!("unknown column `{name}`"))
+                    .at(place("expected time_s, an axis or a load"));
                 let near = crate::base::diagnostics::nearest(name, known.iter().map(String::as_str));
                 return Err(match near {
                     Some(near) => finding.help(format!("did you mean `{near}`?")),
@@ -208,4 +214,3 @@ fn line_at(source: &SourceText, offset: usize) -> std::ops::Range<usize> {
     let end = source.text[start..].find(['\n', '\r']).map_or(source.text.len(), |i| start + i);
     start..end
 }
-

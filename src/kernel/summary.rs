@@ -81,7 +81,6 @@ impl From<&Diagnostic> for Warning {
     }
 }
 
-
 impl RunSummary {
     /// Brings figures to the border. With `drives` the deviations of the drives are included.
     pub fn new(machine: &Machine, program: &str, figures: &Figures, drives: bool) -> Self {

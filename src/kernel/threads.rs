@@ -48,7 +48,12 @@ impl PreparationThread {
             }
             let _ = send.send(Message::Ended(preparation.take_findings()));
         })?;
-        Ok(Self { messages: Some(messages), ready: VecDeque::new(), findings: Findings::default(), worker: Some(worker) })
+        Ok(Self {
+            messages: Some(messages),
+            ready: VecDeque::new(),
+            findings: Findings::default(),
+            worker: Some(worker),
+        })
     }
 }
 

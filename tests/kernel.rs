@@ -1,0 +1,237 @@
+//! The kernel as a library and as a loop: snapshot, threads, determinism, figures, alarms.
+
+use sollwert::base::{AxisKind, MachinePoint};
+use sollwert::kernel::{FollowOptions, Kernel, RunOptions, RunOutcome, SetpointTable, Status, follow, run};
+use sollwert::machine::{Loaded, load};
+use sollwert::program::ProgramSource;
+use sollwert::recorder::{Recording, SignalChoice};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const PROGRAM: &str = "N10 G0 X5 Y0 Z20 S8000 M3
+N20 G1 Z2 F2000 M8
+N30 G642 CTOL=0.05
+N40 X25 Y3
+N50 X28 Y18.5
+N60 G2 X40 Y30.5 I12 J0
+N70 G1 X40.4 Y30.7
+N80 X40.8 Y30.6
+N90 G4 F0.0505
+N100 G60 X12 Y12 Z4
+N110 G64 X5 Y0
+N120 G0 Z20 M5
+N130 M30
+";
+
+fn machine(name: &str, sets: &[&str]) -> Loaded {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    load(name, &sets).unwrap_or_else(|error| panic!("{error:?}"))
+}
+
+fn program(text: &str) -> ProgramSource {
+    ProgramSource::from_bytes("part.mpf", text.as_bytes())
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kernel");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder.join(name)
+}
+
+fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutcome {
+    let options = RunOptions {
+        machine,
+        program: program(text),
+        drives: true,
+        recording: Some(path),
+        mantissa_bits: None,
+        signals: SignalChoice::all(),
+        threads,
+        pace_ratio: None,
+    };
+    run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{error:?}"))
+}
+
+/// Everything that the cycles of a kernel give from here to the end, to the bit (Debug prints the shortest digits that read back).
+fn rest(kernel: &mut Kernel) -> String {
+    let mut text = String::new();
+    while kernel.cycle().unwrap() == Status::Running {
+        let output = kernel.output();
+        text += &format!(
+            "{:?} {:?} {:?} {:?}\n",
+            output.setpoint, output.rows, output.tool_actual, output.contour_error_mm
+        );
+    }
+    text + &format!("{:?}", kernel.figures())
+}
+
+#[test]
+fn a_restored_snapshot_continues_to_the_same_bytes() {
+    let loaded = machine("spinner_mvc850", &[]);
+    let mut kernel = Kernel::new(Arc::new(loaded.machine.clone()), program(PROGRAM), true);
+    // In the middle of a blend, of a dwell, of a ramp: wherever these cycles fall.
+    for _ in 0..3 {
+        for _ in 0..701 {
+            assert_eq!(kernel.cycle().unwrap(), Status::Running);
+        }
+        let mut snapshot = kernel.clone();
+        let mut original = kernel.clone();
+        assert_eq!(rest(&mut snapshot), rest(&mut original));
+    }
+}
+
+#[test]
+fn recordings_are_equal_to_the_byte_on_any_number_of_threads() {
+    for name in ["spinner_mvc850", "xyzbc"] {
+        let loaded = machine(name, &[]);
+        let one = scratch(&format!("{name}_one.mcap"));
+        record(PROGRAM, &loaded, 1, &one);
+        let bytes = std::fs::read(&one).unwrap();
+        for repeat in 0..3 {
+            let many = scratch(&format!("{name}_many_{repeat}.mcap"));
+            record(PROGRAM, &loaded, 2, &many);
+            assert!(std::fs::read(&many).unwrap() == bytes, "{name}: repeat {repeat} differs");
+        }
+    }
+}
+
+#[test]
+fn figures_count_what_the_contract_says() {
+    let loaded = machine("spinner_mvc850", &[]);
+    let path = scratch("figures.mcap");
+    let outcome = record(PROGRAM, &loaded, 2, &path);
+    let summary = &outcome.summary;
+    assert!(outcome.alarm.is_none(), "{:?}", outcome.alarm);
+    let sum: f64 = summary.limits.values().sum();
+    assert!((sum - 1.0).abs() < 1e-12, "limits sum to {sum}");
+    assert!((summary.cycle_time_s - summary.setpoints as f64 * 1e-3).abs() < 1e-9);
+    // X and Y travel, Z plunge, four feed blocks before the arc, arc, two short ones, G60, G64, retract.
+    assert_eq!(summary.blocks, 10);
+    // A dwell of 50.5 ms is 50 or 51 cycles of 1 ms, depending on where it begins.
+    let dwell_s = summary.limits["dwell"] * summary.cycle_time_s;
+    assert!((dwell_s - 0.0505).abs() < 1e-3 + 1e-9, "dwell {dwell_s}");
+    let recording = Recording::open(&path).unwrap();
+    let rows: Vec<u64> = recording.axes().map(|(_, _, topic)| topic.messages).collect();
+    assert_eq!(rows, vec![summary.setpoints + 1; 3], "a row for the start posture and one a set-point");
+    assert_eq!(recording.summary().unwrap()["cycle_time_s"], summary.cycle_time_s);
+}
+
+#[test]
+fn the_first_row_is_home_and_the_last_row_is_the_programmed_end() {
+    let loaded = machine("mikron_ucp710", &[]);
+    let text = "G0 X1 Y2 Z3 A10 C20\nG1 X7.25 Y-3.5 A12.5 C400 F3000\nM30\n";
+    let mut kernel = Kernel::new(Arc::new(loaded.machine.clone()), program(text), false);
+    let (mut first, mut last) = (None, None);
+    while kernel.cycle().unwrap() == Status::Running {
+        let setpoint = kernel.output().setpoint.unwrap();
+        first.get_or_insert(setpoint);
+        last = Some(setpoint);
+    }
+    let posture = |setpoint: sollwert::interpolator::Setpoint| -> Vec<f64> {
+        let point = MachinePoint(sollwert::base::PerAxis::from_fn(|axis| setpoint.axes[axis].position_lu));
+        loaded.machine.axis_ids().map(|axis| point.0[axis]).collect()
+    };
+    let home: Vec<f64> = loaded.machine.axes.iter().map(|axis| axis.home_lu).collect();
+    assert_eq!(posture(first.unwrap()), home);
+    let end = posture(last.unwrap());
+    let wanted = [("X", 7.25), ("Y", -3.5), ("Z", 3.0), ("A", 12.5_f64.to_radians()), ("C", 400_f64.to_radians())];
+    for (name, value_lu) in wanted {
+        let axis = loaded.machine.axis_by_name(name).unwrap();
+        assert!((end[axis.index()] - value_lu).abs() < 1e-12, "{name}: {} {value_lu}", end[axis.index()]);
+    }
+    for axis in loaded.machine.axis_ids() {
+        assert_eq!(last.unwrap().axes[axis].velocity_lu_s, 0.0, "at rest at the end");
+    }
+}
+
+#[test]
+fn an_alarm_ends_the_run_after_everything_before_it_was_executed() {
+    let loaded = machine("spinner_mvc850", &[]);
+    let path = scratch("alarm.mcap");
+    let outcome = record("G1 X10 F1000\nX20\nX=1/0\nX30\nM30\n", &loaded, 2, &path);
+    let alarm = outcome.alarm.expect("a division by zero is an alarm");
+    assert_eq!(alarm.line(), 3);
+    assert_eq!(outcome.summary.path_length_mm, 20.0);
+    let recording = Recording::open(&path).unwrap();
+    assert!(recording.summary().unwrap().get("alarm").is_some());
+}
+
+#[test]
+fn axes_with_slower_position_cycles_step_on_their_own_grid() {
+    // Mikron: t_s = 4 ms; X at 2 ms, C at 4 ms.
+    let loaded = machine("mikron_ucp710", &[]);
+    let path = scratch("mikron.mcap");
+    let outcome = record("G1 X3 C30 F2000\nM30\n", &loaded, 1, &path);
+    let n = outcome.summary.setpoints;
+    let recording = Recording::open(&path).unwrap();
+    for (name, kind, topic) in recording.axes() {
+        let wanted = if name == "C" { n + 1 } else { 2 * n + 1 };
+        assert_eq!(topic.messages, wanted, "axis {name} {kind:?}");
+        assert_eq!(kind == AxisKind::Rotary, name == "A" || name == "C");
+    }
+}
+
+#[test]
+fn follow_reproduces_the_drives_of_a_run() {
+    let loaded = machine("spinner_mvc850", &[]);
+    let path = scratch("to_follow.mcap");
+    let run = record(PROGRAM, &loaded, 2, &path);
+    let table = SetpointTable::from_recording(&Recording::open(&path).unwrap(), &loaded.machine).unwrap();
+    let options = FollowOptions {
+        machine: &loaded,
+        start: Default::default(),
+        recording: None,
+        signals: SignalChoice::all(),
+        mantissa_bits: None,
+    };
+    let followed = follow(&table, &options).unwrap();
+    for axis in ["X", "Y", "Z"] {
+        for key in ["following_error_max_mm", "following_error_rms_mm", "control_deviation_rms_mm"] {
+            assert_eq!(followed.summary["axes"][axis][key], run.summary.axes[axis][key], "{axis} {key}");
+        }
+    }
+}
+
+#[test]
+fn a_table_of_setpoints_is_refused_with_the_place() {
+    let loaded = machine("spinner_mvc850", &[]);
+    let read = |text: &str| {
+        SetpointTable::from_csv(&sollwert::base::SourceText::new("s.csv", text), &loaded.machine)
+            .map(|table| table.rows)
+    };
+    assert_eq!(read("time_s,X_mm\n0,1\n0.001,2\n").unwrap(), 2);
+    assert_eq!(read("time_s,X_mm\r\n0,1\r\n0.001,2\r\n").unwrap(), 2);
+    let finding = read("time_s,X_mm\n0,1\n0.001,abc\n").unwrap_err();
+    assert_eq!((finding.line(), finding.message.contains("abc")), (3, true));
+    let finding = read("time_s,X_mm\n0,1\n0.005,2\n").unwrap_err();
+    assert!(finding.line() == 3 && finding.message.contains("0.001"), "{finding:?}");
+    let finding = read("time_s,Q_mm\n0,1\n").unwrap_err();
+    assert!(finding.line() == 1 && finding.message.contains("Q_mm"), "{finding:?}");
+    assert!(read("time_s,X_mm\n").is_err());
+    assert!(read("time_s,X_mm\n0,nan\n").is_err());
+    assert!(read("").is_err());
+    assert!(read("time_s,X_mm\n0\n").is_err());
+}
+
+#[test]
+fn an_outside_load_moves_an_axis_only_against_its_friction() {
+    // X of the Spinner: breakaway 0.6 N m. Half of it leaves the axis where it is, to the bit; five times as much moves it until
+    // the position loop holds it: at rest the integrator balances the load and the deviation goes back to zero.
+    let loaded = machine("spinner_mvc850", &[]);
+    let row = |load: f64, n: usize| -> String { (0..n).map(|k| format!("{},0,{load}\n", k as f64 * 1e-3)).collect() };
+    let deviation = |load: f64| {
+        let text = format!("time_s,X_mm,X_load_n_m\n{}", row(load, 2000));
+        let table = SetpointTable::from_csv(&sollwert::base::SourceText::new("s.csv", text), &loaded.machine).unwrap();
+        let options = FollowOptions {
+            machine: &loaded,
+            start: Default::default(),
+            recording: None,
+            signals: SignalChoice::all(),
+            mantissa_bits: None,
+        };
+        let figures = follow(&table, &options).unwrap().summary;
+        figures["axes"]["X"]["following_error_max_mm"].as_f64().unwrap()
+    };
+    assert_eq!(deviation(0.3), 0.0);
+    assert!(deviation(3.0) > 1e-4);
+}
