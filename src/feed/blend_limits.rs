@@ -159,7 +159,7 @@ impl<'a> Scan<'a> {
     fn demand(&self, watch: Watch, point: &BlendPoint) -> Demand {
         let (ra, rj) = (self.rules.radial_acceleration_share, self.rules.radial_jerk_share);
         let k = point.curvature_per_mm.abs();
-        let k_slope = point.curvature_slope_per_mm2.abs();
+        let k_slope = point.curvature_slope_per_mm_mm.abs();
         self.rules.largest(|axis, limits| {
             let (t, n) = (point.tangent[axis].abs(), point.normal[axis].abs());
             let (a_max, j_max) = (limits.acceleration_max_lu_s2, limits.transition_jerk_max_lu_s3);
