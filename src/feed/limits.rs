@@ -257,12 +257,21 @@ impl PieceLimits {
         Self { cap, ramp_cap, bounds }
     }
 
-    /// Highest speed at one end of `length_lu` if it is `from` at the other, and what sets it.
+    /// Highest speed at the end of `length_lu` if it is `from` at its start, and what sets it; the same for braking to exactly
+    /// `from`.
     pub(super) fn reach(&self, from: SpeedCap, length_lu: f64) -> SpeedCap {
+        self.capped(from, self.bounds.dynamics.reachable(from.velocity_lu_s, length_lu))
+    }
+
+    /// Highest speed from which one can brake within `length_lu` to any speed not above it, from `to` on.
+    pub(super) fn brake(&self, to: SpeedCap, length_lu: f64) -> SpeedCap {
+        self.capped(to, self.bounds.dynamics.brakeable(to.velocity_lu_s, length_lu))
+    }
+
+    fn capped(&self, from: SpeedCap, velocity_lu_s: f64) -> SpeedCap {
         if self.ramp_cap.velocity_lu_s <= from.velocity_lu_s {
             return from;
         }
-        let velocity_lu_s = self.bounds.dynamics.reachable(from.velocity_lu_s, length_lu);
         let limit = self.ramp_limit(from.velocity_lu_s, velocity_lu_s);
         SpeedCap { velocity_lu_s, limit }.min(self.ramp_cap)
     }

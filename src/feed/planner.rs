@@ -4,7 +4,9 @@
 //! motion blocks beyond it, whatever was pushed; at its end the path must be able to rest. A backward pass finds for every junction
 //! the highest speed from which that is possible; it runs from the newest piece towards the first and ends where a junction keeps its
 //! speed, so that its cost is that of the braking distance and not of the window. More path can only raise these speeds: what was
-//! fixed stays possible. A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
+//! fixed stays possible. (A ramp ends without acceleration, so that a *higher* speed at the end of a piece may ask for a *lower* one
+//! at its start. Where the speed at the end can still rise, the speed at the start is therefore one from which any of them can be
+//! met; it is exact where the speed at the end is settled.) A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
 //! Does not sample, and does not know axes: `limits` and `junction` do.
 
 use super::junction::{self, FREE, STOP};
@@ -54,8 +56,20 @@ struct Entry {
     /// The path rests at its end, whatever follows.
     rests_after: bool,
     /// Backward pass: highest speed at its start.
-    entry: SpeedCap,
+    entry: Planned,
 }
+
+/// Result of the backward pass at a junction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Planned {
+    /// Highest speed.
+    cap: SpeedCap,
+    /// More path cannot raise it.
+    settled: bool,
+}
+
+/// The path rests for good.
+const REST: Planned = Planned { cap: STOP, settled: true };
 
 /// How a piece moves.
 #[derive(Clone, Debug)]
@@ -119,7 +133,7 @@ impl Planner {
         if rests_after {
             self.last = None;
         }
-        self.entries.push_back(Entry { path, motion, corner, rests_after, entry: STOP });
+        self.entries.push_back(Entry { path, motion, corner, rests_after, entry: REST });
     }
 
     /// No more pieces: the path ends at rest.
@@ -137,7 +151,7 @@ impl Planner {
             return None;
         }
         self.plan_backward();
-        let ahead = if self.admitted > 1 { self.entries[1].entry } else { self.end_of_window() };
+        let ahead = if self.admitted > 1 { self.entries[1].entry.cap } else { self.end_of_window().cap };
         let front = self.entries.pop_front()?;
         let (law, exit) = front.fixed(self.entry, ahead, self.rules.setpoint_period_s);
         let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond };
@@ -207,8 +221,8 @@ impl Planner {
     fn admit_one(&mut self) {
         let index = self.admitted;
         let half_before_lu = self.half_blend_lu;
-        // The piece before ended the window until now.
-        self.changed_from = self.changed_from.min(index.saturating_sub(1));
+        // The piece before ended the window until now, and the speed at its start was not settled.
+        self.changed_from = self.changed_from.min(index.saturating_sub(2));
         let entry = &mut self.entries[index];
         self.rests += usize::from(entry.rests_after);
         if index > 0 {
@@ -236,14 +250,19 @@ impl Planner {
         }
     }
 
+    /// The window ends where the path does.
+    fn window_ends_path(&self) -> bool {
+        self.finished && self.admitted == self.entries.len()
+    }
+
     /// Speed at the end of the window.
-    fn end_of_window(&self) -> SpeedCap {
+    fn end_of_window(&self) -> Planned {
         let last = self.admitted.checked_sub(1).map(|last| &self.entries[last]);
-        let ends = self.finished && self.admitted == self.entries.len();
-        if ends || last.is_none_or(|last| last.rests_after) {
-            return STOP;
+        if self.window_ends_path() || last.is_none_or(|last| last.rests_after) {
+            return REST;
         }
-        SpeedCap { velocity_lu_s: 0.0, limit: Limit { kind: LimitKind::LookAhead, axis: None } }
+        let limit = Limit { kind: LimitKind::LookAhead, axis: None };
+        Planned { cap: SpeedCap { velocity_lu_s: 0.0, limit }, settled: false }
     }
 
     /// Highest speeds at the starts of all pieces but the first, from the end of the window.
@@ -262,14 +281,19 @@ impl Planner {
     }
 
     /// Highest speed at the start of a piece if it is `exit` at its end.
-    fn highest_entry(&self, index: usize, exit: SpeedCap) -> SpeedCap {
+    fn highest_entry(&self, index: usize, exit: Planned) -> Planned {
         let (before, piece) = (&self.entries[index - 1], &self.entries[index]);
-        let t_s = self.rules.setpoint_period_s;
-        let mut junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
-        if before.rests_after {
-            junction = junction.min(STOP);
+        if before.rests_after || piece.rests_before() {
+            return REST;
         }
-        junction.min(piece.motion.highest_entry(if piece.rests_after { STOP } else { exit }))
+        let t_s = self.rules.setpoint_period_s;
+        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
+        let inside = piece.motion.highest_entry(if piece.rests_after { REST } else { exit });
+        if inside.cap.velocity_lu_s < junction.velocity_lu_s {
+            return inside;
+        }
+        // The last block of the window may still get the half of its blend.
+        Planned { cap: junction, settled: index + 1 < self.admitted || self.window_ends_path() }
     }
 }
 
@@ -314,14 +338,19 @@ impl Motion {
     }
 
     /// Highest speed at the start from which the piece can be left with `exit`.
-    fn highest_entry(&self, exit: SpeedCap) -> SpeedCap {
+    fn highest_entry(&self, exit: Planned) -> Planned {
         match self {
             Self::Moves { limits, length_lu, .. } => {
-                let reached = limits.reach(exit, *length_lu);
+                let cap = if exit.settled {
+                    limits.reach(exit.cap, *length_lu)
+                } else {
+                    limits.brake(exit.cap, *length_lu)
+                };
                 // Where the path rests for good it is the braking that holds; any other junction passes on its own reason.
-                if exit == STOP { reached } else { SpeedCap { limit: exit.limit, ..reached } }
+                let limit = if exit == REST { cap.limit } else { exit.cap.limit };
+                Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }
             }
-            Self::Waits { .. } => STOP,
+            Self::Waits { .. } => REST,
             Self::Nothing => exit,
         }
     }

@@ -62,9 +62,21 @@ impl Dynamics {
     }
 
     /// Highest speed to which `length_lu` suffices from `from_lu_s`; by symmetry also the highest speed from which one can
-    /// brake to `from_lu_s` within it.
+    /// brake to exactly `from_lu_s` within it.
     pub fn reachable(&self, from_lu_s: f64, length_lu: f64) -> f64 {
         from_lu_s + self.gain(from_lu_s, length_lu)
+    }
+
+    /// Highest speed from which one can brake within `length_lu` to `to_lu_s` and to every other speed not above it: never less
+    /// for a higher `to_lu_s`, as [`reachable`](Self::reachable) may be. A ramp ends without acceleration, so that braking to a
+    /// third of a speed takes more way than braking to rest.
+    pub fn brakeable(&self, to_lu_s: f64, length_lu: f64) -> f64 {
+        let Some(j) = self.jerk_lu_s3 else { return self.reachable(to_lu_s, length_lu) };
+        // Where d(reachable)/d(to) = 0: J x² / 2 with 2 J x³ = L, or A²/(2 J) with a phase of constant acceleration.
+        let x = (length_lu / (2.0 * j)).cbrt();
+        let a = self.acceleration_lu_s2;
+        let lowest_lu_s = (j * x * x / 2.0).min(a * a / (2.0 * j));
+        self.reachable(to_lu_s.max(lowest_lu_s), length_lu)
     }
 
     /// Highest speed from which both ramps, `from -> peak -> to`, fit into `length_lu`; at least the higher one of the two.
@@ -72,8 +84,8 @@ impl Dynamics {
         let (low, high) = (from_lu_s.min(to_lu_s), from_lu_s.max(to_lu_s));
         let difference = high - low;
         // With x² = peak - high both ramp lengths are convex and rise with x, so that Newton's method falls monotonically from
-        // any upper bound. The ramp from `low` is never the shorter one: half the length from `high` is such a bound.
-        let mut x = self.gain(high, length_lu / 2.0).sqrt();
+        // any upper bound: the peak that one of the two ramps alone would allow.
+        let mut x = self.gain(high, if difference > 0.0 { length_lu } else { length_lu / 2.0 }).sqrt();
         for _ in 0..NEWTON_ROUNDS {
             let gain = x * x;
             let (upper_lu, upper_slope) = self.length_and_slope(high, gain);
