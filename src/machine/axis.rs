@@ -112,10 +112,11 @@ fn check_name(parent: &Section<'_>, entry: &Entry) {
     };
     let capital = letter.to_ascii_uppercase();
     if let Some((_, meaning)) = TAKEN_LETTERS.iter().find(|(taken, _)| *taken == capital) {
-        let letters: String = TAKEN_LETTERS.iter().map(|(letter, _)| *letter).collect();
+        let free = ('A'..='Z').filter(|letter| TAKEN_LETTERS.iter().all(|(taken, _)| taken != letter));
+        let free: Vec<String> = free.map(String::from).collect();
         report(
             format!("the axis name {name} is taken: {capital} is {meaning} in a program"),
-            format!("use a letter that is none of {letters}"),
+            format!("use one of {}", free.join(", ")),
         );
     } else if !letter.is_ascii_uppercase() || digits.len() > 2 || !digits.chars().all(|c| c.is_ascii_digit()) {
         let message = format!("the axis name {name:?} is not a capital letter, or one with one or two digits");
