@@ -212,7 +212,7 @@ fn dynamics(axis: &Section<'_>, limits_of_axis: &AxisLimits) -> AxisDynamics {
 }
 
 /// Travel in order, home inside it, and none on an endless axis. All in the unit of the file.
-fn check_travel(section: &Section<'_>, travel: Option<[f64; 2]>, home: f64, modulo: bool) {
+fn check_travel(section: &Section<'_>, travel: Option<[f64; 2]>, home_mm_or_deg: f64, modulo: bool) {
     let Some([lower, upper]) = travel.filter(|[lower, upper]| lower < upper) else { return };
     let kind = section.kind().unwrap_or(AxisKind::Linear);
     let (travel_key, home_key, unit) = match kind {
@@ -223,9 +223,11 @@ fn check_travel(section: &Section<'_>, travel: Option<[f64; 2]>, home: f64, modu
         let message =
             format!("{} and modulo = true exclude each other: an endless axis has no travel", section.full(travel_key));
         section.report_at(travel_key, "", Diagnostic::error("M0008", message).help("remove one of the two"));
-    } else if home < lower || home > upper {
-        let message =
-            format!("{} = {home} {unit} is outside the travel {lower} .. {upper} {unit}", section.full(home_key));
+    } else if home_mm_or_deg < lower || home_mm_or_deg > upper {
+        let message = format!(
+            "{} = {home_mm_or_deg} {unit} is outside the travel {lower} .. {upper} {unit}",
+            section.full(home_key)
+        );
         let help = format!("write {home_key} inside {travel_key}; where it is missing it is 0");
         section.report_at(home_key, "outside the travel", Diagnostic::warning("M0101", message).help(help));
     }

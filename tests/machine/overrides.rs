@@ -127,6 +127,8 @@ fn faults_are_shown_in_the_argument() {
         let message = refused(&[argument]);
         assert!(message.contains(words) && message.contains("--set"), "{argument}: {message}");
     }
+    let deep = format!("{}=word", ["a"; 100_000].join("."));
+    assert!(refused(&[&deep]).contains("is no key"));
     // All wrong arguments at once.
     let message = refused(&["jerk", "axes.Q.x=1"]);
     assert!(message.contains("there is no =") && message.contains("no axis Q"), "{message}");
