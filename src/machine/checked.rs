@@ -348,31 +348,31 @@ pub struct DriveData {
     pub speed_cycle_ticks: u64,
     /// T_i in ticks.
     pub current_cycle_ticks: u64,
-    /// [Kv], MD32200.
+    /// `Kv`, MD32200.
     pub position_gain_per_s: f64,
-    /// [kvff], MD32610.
+    /// `kvff`, MD32610.
     pub velocity_feedforward_ratio: f64,
-    /// [ktff].
+    /// `ktff`.
     pub torque_feedforward_ratio: f64,
-    /// [J_ff], MD32650.
+    /// `J_ff`, MD32650.
     pub feedforward_inertia_kg_m2: f64,
-    /// [d_pos].
+    /// `d_pos`.
     pub setpoint_delay_s: f64,
-    /// [d_ff].
+    /// `d_ff`.
     pub feedforward_delay_s: f64,
-    /// [v_max]; may be infinite.
+    /// `v_max`; may be infinite.
     pub speed_setpoint_max_lu_s: f64,
-    /// [Kp], p1460.
+    /// `Kp`, p1460.
     pub speed_gain_n_m_s_per_rad: f64,
-    /// [Tn], p1462; may be infinite (no integral part).
+    /// `Tn`, p1462; may be infinite (no integral part).
     pub speed_reset_time_s: f64,
-    /// [Kpi], p1715.
+    /// `Kpi`, p1715.
     pub current_gain_v_per_a: f64,
-    /// [Tni], p1717; may be infinite.
+    /// `Tni`, p1717; may be infinite.
     pub current_reset_time_s: f64,
-    /// [i_max]; may be infinite.
+    /// `i_max`; may be infinite.
     pub current_max_a: f64,
-    /// [u_max]; may be infinite.
+    /// `u_max`; may be infinite.
     pub voltage_max_v: f64,
     /// Motor.
     pub motor: MotorData,
@@ -385,42 +385,42 @@ pub struct DriveData {
 /// `[axes.*.motor]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorData {
-    /// [R].
+    /// `R`.
     pub resistance_ohm: f64,
-    /// [L].
+    /// `L`.
     pub inductance_h: f64,
-    /// [Ke].
+    /// `Ke`.
     pub back_emf_v_s_per_rad: f64,
-    /// [Kt].
+    /// `Kt`.
     pub torque_constant_n_m_per_a: f64,
 }
 
 /// `[axes.*.mechanics]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MechanicsData {
-    /// [r]: load motion per motor radian (mm/rad or rad/rad); may be negative, never 0.
+    /// `r`: load motion per motor radian (mm/rad or rad/rad); may be negative, never 0.
     pub transmission_lu_per_rad: f64,
-    /// [J].
+    /// `J`.
     pub inertia_kg_m2: f64,
-    /// [B].
+    /// `B`.
     pub viscous_friction_n_m_s_per_rad: f64,
-    /// [Tc].
+    /// `Tc`.
     pub coulomb_friction_n_m: f64,
-    /// [Ts].
+    /// `Ts`.
     pub breakaway_friction_n_m: f64,
     /// [g0].
     pub gravity_n_m: f64,
-    /// [gs].
+    /// `gs`.
     pub gravity_sin_n_m: f64,
-    /// [gc].
+    /// `gc`.
     pub gravity_cos_n_m: f64,
 }
 
 /// `[axes.*.encoder]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncoderData {
-    /// [q_pos]; 0 = ideal.
+    /// `q_pos`; 0 = ideal.
     pub position_resolution_lu: f64,
-    /// [q_mot]; 0 = ideal.
+    /// `q_mot`; 0 = ideal.
     pub motor_resolution_rad: f64,
 }
