@@ -408,7 +408,7 @@ pub struct MechanicsData {
     pub coulomb_friction_n_m: f64,
     /// `Ts`.
     pub breakaway_friction_n_m: f64,
-    /// [g0].
+    /// `g0`.
     pub gravity_n_m: f64,
     /// `gs`.
     pub gravity_sin_n_m: f64,
