@@ -112,10 +112,11 @@ fn check_name(parent: &Section<'_>, entry: &Entry) {
     };
     let capital = letter.to_ascii_uppercase();
     if let Some((_, meaning)) = TAKEN_LETTERS.iter().find(|(taken, _)| *taken == capital) {
-        let letters: String = TAKEN_LETTERS.iter().map(|(letter, _)| *letter).collect();
+        let free = ('A'..='Z').filter(|letter| TAKEN_LETTERS.iter().all(|(taken, _)| taken != letter));
+        let free: Vec<String> = free.map(String::from).collect();
         report(
             format!("the axis name {name} is taken: {capital} is {meaning} in a program"),
-            format!("use a letter that is none of {letters}"),
+            format!("use one of {}", free.join(", ")),
         );
     } else if !letter.is_ascii_uppercase() || digits.len() > 2 || !digits.chars().all(|c| c.is_ascii_digit()) {
         let message = format!("the axis name {name:?} is not a capital letter, or one with one or two digits");
@@ -211,7 +212,7 @@ fn dynamics(axis: &Section<'_>, limits_of_axis: &AxisLimits) -> AxisDynamics {
 }
 
 /// Travel in order, home inside it, and none on an endless axis. All in the unit of the file.
-fn check_travel(section: &Section<'_>, travel: Option<[f64; 2]>, home: f64, modulo: bool) {
+fn check_travel(section: &Section<'_>, travel: Option<[f64; 2]>, home_mm_or_deg: f64, modulo: bool) {
     let Some([lower, upper]) = travel.filter(|[lower, upper]| lower < upper) else { return };
     let kind = section.kind().unwrap_or(AxisKind::Linear);
     let (travel_key, home_key, unit) = match kind {
@@ -222,9 +223,11 @@ fn check_travel(section: &Section<'_>, travel: Option<[f64; 2]>, home: f64, modu
         let message =
             format!("{} and modulo = true exclude each other: an endless axis has no travel", section.full(travel_key));
         section.report_at(travel_key, "", Diagnostic::error("M0008", message).help("remove one of the two"));
-    } else if home < lower || home > upper {
-        let message =
-            format!("{} = {home} {unit} is outside the travel {lower} .. {upper} {unit}", section.full(home_key));
+    } else if home_mm_or_deg < lower || home_mm_or_deg > upper {
+        let message = format!(
+            "{} = {home_mm_or_deg} {unit} is outside the travel {lower} .. {upper} {unit}",
+            section.full(home_key)
+        );
         let help = format!("write {home_key} inside {travel_key}; where it is missing it is 0");
         section.report_at(home_key, "outside the travel", Diagnostic::warning("M0101", message).help(help));
     }

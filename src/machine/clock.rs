@@ -115,7 +115,7 @@ impl RatioCheck {
         let (long_key, long, long_unit) = self.longer;
         let (short_key, short, short_unit) = self.shorter;
         let long_in_short = long * self.unit_ratio;
-        if let Some(whole) = whole_ratio(long_in_short, short) {
+        if let Some(whole) = whole_ratio(long_in_short / short) {
             return Some(whole);
         }
         // NaN was reported where it was read.

@@ -141,7 +141,7 @@ fn transmission(mechanics: &Section<'_>, kind: AxisKind) -> f64 {
     match kind {
         AxisKind::Linear => mechanics.number("pitch_mm") / RAD_PER_REV / gear_ratio.unwrap_or(1.0),
         AxisKind::Rotary => {
-            if !mechanics.has("gear_ratio") {
+            if !mechanics.has("gear_ratio") && !mechanics.has("pitch_mm") {
                 let help = "add gear_ratio = ..., motor turns per turn of the axis; it may be negative, not 0";
                 mechanics.missing("gear_ratio", help);
             }

@@ -164,6 +164,7 @@ impl Key {
     pub fn describe_range(&self) -> String {
         match self.accepts {
             Accepts::Number(range) => range.describe(self.unit),
+            Accepts::Whole(least, most) if least == most => least.to_string(),
             Accepts::Whole(least, most) => format!("a whole number from {least} to {most}"),
             Accepts::Flag => "true or false".to_owned(),
             Accepts::Text => "a text, not empty".to_owned(),

@@ -11,6 +11,9 @@ use toml_edit::{DocumentMut, InlineTable, Item, Key, Table, TableLike};
 /// The name under which a diagnostic shows the argument.
 pub(super) const SET: &str = "--set";
 
+/// Most parts of a dotted key: the deepest of the format has five (axes.X.dynamics.finish.jerk_max_m_s3).
+const DEPTH_MAX: usize = 8;
+
 /// One argument, read.
 #[derive(Clone, Debug)]
 pub(super) struct Override {
@@ -36,7 +39,7 @@ pub(super) fn parse(argument: &str, number: usize) -> Result<Override, Box<Diagn
         return Err(wrong("--set: the argument has more than one line".to_owned()));
     }
     let path: Vec<String> = match Key::parse(key_text) {
-        Ok(keys) if !keys.is_empty() => keys.iter().map(|key| key.get().to_owned()).collect(),
+        Ok(keys) if (1..=DEPTH_MAX).contains(&keys.len()) => keys.iter().map(|key| key.get().to_owned()).collect(),
         _ => return Err(wrong(format!("--set {argument}: {key_text:?} is no key"))),
     };
     let key_mark = Mark { source: number, span: 0..key_text.trim_end().len() };

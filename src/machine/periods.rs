@@ -15,11 +15,10 @@ pub(super) const RATIO_MAX: u64 = 1_000_000;
 /// Largest denominator of the simple fractions that a cut-off decimal may stand for.
 const SIMPLE_DENOMINATOR_MAX: u64 = 1000;
 
-/// The whole ratio of two cycles in the same unit, if it is one.
-pub(super) fn whole_ratio(longer: f64, shorter: f64) -> Option<u64> {
-    let ratio = longer / shorter;
-    let whole = ratio.round();
-    let is_whole = whole >= 1.0 && whole <= RATIO_MAX as f64 && (ratio - whole).abs() <= RATIO_TOLERANCE * whole;
+/// The whole number that a ratio of two cycles is, if it is one.
+pub(super) fn whole_ratio(period_ratio: f64) -> Option<u64> {
+    let whole = period_ratio.round();
+    let is_whole = whole >= 1.0 && whole <= RATIO_MAX as f64 && (period_ratio - whole).abs() <= RATIO_TOLERANCE * whole;
     is_whole.then_some(whole as u64)
 }
 
@@ -116,9 +115,9 @@ mod tests {
 
     #[test]
     fn three_current_cycles_of_83_us_are_a_speed_cycle_of_250_us() {
-        assert_eq!(whole_ratio(250.0, 83.333_333_333_333), Some(3));
-        assert_eq!(whole_ratio(250.0, 83.333), None);
-        assert_eq!(whole_ratio(1.0, 2.0), None);
-        assert_eq!(whole_ratio(1.0, f64::NAN), None);
+        assert_eq!(whole_ratio(250.0 / 83.333_333_333_333), Some(3));
+        assert_eq!(whole_ratio(250.0 / 83.333), None);
+        assert_eq!(whole_ratio(0.5), None);
+        assert_eq!(whole_ratio(f64::NAN), None);
     }
 }

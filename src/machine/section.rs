@@ -184,8 +184,8 @@ impl<'f> Section<'f> {
         }
         let unit = if key.unit.is_empty() { String::new() } else { format!(" {}", key.unit) };
         let message = format!("{full} = {text}{unit} is out of range, allowed: {}", range.describe(key.unit));
-        let machine_data = if key.machine_data.is_empty() { String::new() } else { format!(", {}", key.machine_data) };
-        let help = format!("{} is: {}{machine_data}", key.name, key.help);
+        let machine_data = if key.machine_data.is_empty() { String::new() } else { format!(" ({})", key.machine_data) };
+        let help = format!("{}: {}{machine_data}", key.name, key.help);
         let diagnostic = Diagnostic::error("M0006", message).help(help);
         self.report(&node.mark, "out of range", diagnostic);
         f64::NAN
@@ -336,10 +336,11 @@ impl<'f> Section<'f> {
 
     /// Reports a required key that is not there.
     pub fn missing(&self, name: &str, help: &str) {
-        if self.quiet {
+        let key = self.key(name);
+        // A misspelt key, or that of the other kind of axis, has its own report.
+        if self.quiet || self.has(key.counterpart) || self.entries.iter().any(|entry| self.misspells(entry, name)) {
             return;
         }
-        let key = self.key(name);
         let table = if self.path.is_empty() { "the machine file".to_owned() } else { format!("[{}]", self.path) };
         let unit = if key.unit.is_empty() { String::new() } else { format!(" ({})", key.unit) };
         let message = format!("{table} has no {name}{unit}: {}", key.help);
@@ -387,18 +388,25 @@ impl<'f> Section<'f> {
         self.report(&entry.key_mark, "not for this kind of axis", Diagnostic::error("M0003", message).help(help));
     }
 
+    /// Keys and tables that may stand here.
+    fn known(&self) -> impl Iterator<Item = &'static str> + use<> {
+        let kind = self.kind;
+        let keys = self.keys.keys.iter().filter(move |key| key.fits(kind)).map(|key| key.name);
+        keys.chain(self.keys.tables.iter().copied())
+    }
+
+    fn misspells(&self, entry: &Entry, name: &str) -> bool {
+        self.known().all(|known| known != entry.key) && nearest(&entry.key, self.known()) == Some(name)
+    }
+
     fn unknown(&self, entry: &Entry) {
-        let known = || {
-            let keys = self.keys.keys.iter().filter(|key| key.fits(self.kind)).map(|key| key.name);
-            keys.chain(self.keys.tables.iter().copied())
-        };
         let table = if self.path.is_empty() { "the top of the file".to_owned() } else { format!("[{}]", self.path) };
         let elsewhere = catalogue::tables().iter().find(|t| t.keys.iter().any(|key| key.name == entry.key));
-        let help = match (nearest(&entry.key, known()), elsewhere) {
+        let help = match (nearest(&entry.key, self.known()), elsewhere) {
             (Some(near), _) => format!("did you mean {near}?"),
             (None, Some(TableKeys { path: "", .. })) => "it belongs to the top of the file".to_owned(),
             (None, Some(table)) => format!("it belongs to [{}]", self.on_this_axis(table.path)),
-            (None, None) => format!("{table} has {}", known().collect::<Vec<_>>().join(", ")),
+            (None, None) => format!("{table} has {}", self.known().collect::<Vec<_>>().join(", ")),
         };
         let message = format!("unknown key {} in {table}", self.full(&entry.key));
         self.report(&entry.key_mark, "unknown key", Diagnostic::error("M0003", message).help(help));
