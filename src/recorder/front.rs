@@ -27,9 +27,10 @@ use std::thread::JoinHandle;
 /// Messages stand in the file in the order of the calls: call in order of ticks. A recording that is dropped without
 /// [`Recorder::finish`] is left unfinished, as after a killed run.
 pub struct Recorder {
-    orders: Sender<Order>,
+    /// `None` once the last order is given.
+    orders: Option<Sender<Order>>,
     returned: Receiver<Batch>,
-    thread: JoinHandle<Result<RecordingSummary, Diagnostic>>,
+    thread: Option<JoinHandle<Result<RecordingSummary, Diagnostic>>>,
     fault: Fault,
     name: String,
     batch: Batch,
@@ -77,9 +78,9 @@ impl Recorder {
         let time_base = setup.machine.cycle.time_base;
         let every = setup.decimation.get();
         Ok(Self {
-            orders,
+            orders: Some(orders),
             returned,
-            thread,
+            thread: Some(thread),
             fault,
             name,
             batch: Batch::empty(),
@@ -156,10 +157,16 @@ impl Recorder {
             self.push(record);
         }
         self.send(false);
-        // If the thread is gone, joining it says why.
-        let _ = self.orders.send(Order::Finish(summary_metadata(summary_json)));
-        drop(self.orders);
-        self.thread.join().unwrap_or_else(|_| {
+        if let Some(orders) = self.orders.take() {
+            // If the thread is gone, joining it says why.
+            let _ = orders.send(Order::Finish(summary_metadata(summary_json)));
+        }
+        self.join()
+    }
+
+    fn join(&mut self) -> Result<RecordingSummary, Diagnostic> {
+        let joined = self.thread.take().and_then(|thread| thread.join().ok());
+        joined.unwrap_or_else(|| {
             Err(Diagnostic::error("R0002", format!("the recorder's thread of {} broke down", self.name))
                 .help("please report this; `sollwert recover` rescues what was written"))
         })
@@ -188,7 +195,21 @@ impl Recorder {
         };
         std::mem::swap(&mut batch, &mut self.batch);
         batch.close_chunk = close_chunk;
-        let _ = self.orders.send(Order::Write(batch));
+        if let Some(orders) = &self.orders {
+            let _ = orders.send(Order::Write(batch));
+        }
+    }
+}
+
+impl Drop for Recorder {
+    /// A run that ends without `finish` (an error, a panic elsewhere) keeps all that it recorded, without an index.
+    fn drop(&mut self) {
+        if self.orders.is_some() {
+            self.send(true);
+            self.orders = None;
+            // The file is unfinished, which is what this says; nobody is left to hear more.
+            let _ = self.join();
+        }
     }
 }
 

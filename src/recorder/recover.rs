@@ -167,7 +167,10 @@ impl Rescue {
                 op::ATTACHMENT => self.take_attachment(records, &frame),
                 op::METADATA => self.take_metadata(records, &frame),
                 op::DATA_END => return Ok(()),
-                op::MESSAGE | op::SCHEMA | op::CHANNEL => self.take_loose_record(records, &frame),
+                // In a file with chunks, a message outside of them is what a wrong length made of other bytes.
+                op::MESSAGE | op::SCHEMA | op::CHANNEL if self.contents.chunks == 0 => {
+                    self.take_loose_record(records, &frame)
+                }
                 _ => records.skip(&frame).map_err(Fault::Read),
             };
             self.read_until = frame.end();
@@ -242,7 +245,9 @@ impl Rescue {
         match opcode {
             op::SCHEMA | op::CHANNEL => {
                 self.contents.declare(opcode, body);
-                Ok(())
+                // At the same place as in the input, so that a rescued beginning is the beginning byte for byte.
+                let id = body.first_chunk().map_or(0, |id| u16::from_le_bytes(*id));
+                if opcode == op::SCHEMA { self.declare_schema(id).map(|_| ()) } else { self.channel(id).map(|_| ()) }
             }
             op::MESSAGE => {
                 let message = RawMessage::parse(body).ok_or_else(|| bad_chunk(offset, "a message is too short"))?;
@@ -263,14 +268,7 @@ impl Rescue {
     }
 
     fn write(&mut self, message: &RawMessage) -> Result<(), Fault> {
-        let channel = match self.channels.get(&message.channel) {
-            Some(channel) => *channel,
-            None => {
-                let channel = self.declare(message.channel)?;
-                self.channels.insert(message.channel, channel);
-                channel
-            }
-        };
+        let channel = self.channel(message.channel)?;
         let Some(channel_id) = channel else {
             self.report.messages_undeclared += 1;
             return Ok(());
@@ -287,24 +285,33 @@ impl Rescue {
         Ok(())
     }
 
-    /// Declares a channel in the new file, under its old number.
-    fn declare(&mut self, id: u16) -> Result<Option<u16>, Fault> {
-        let Some(channel) = self.contents.channels.get(&id) else { return Ok(None) };
-        if channel.schema_id != 0 {
-            let Some(schema) = self.contents.schemas.get(&channel.schema_id) else { return Ok(None) };
-            let header = &schema.header;
-            let declared = self.mcap.add_schema_with_id(header.id, &header.name, &header.encoding, &schema.data);
-            if unless_write_failed(declared)?.is_none() {
-                return Ok(None);
-            }
+    /// Number of a channel in the new file, where it is declared when it is first met.
+    fn channel(&mut self, id: u16) -> Result<Option<u16>, Fault> {
+        if let Some(channel) = self.channels.get(&id) {
+            return Ok(*channel);
         }
-        unless_write_failed(self.mcap.add_channel_with_id(
-            id,
-            channel.schema_id,
-            &channel.topic,
-            &channel.message_encoding,
-            &channel.metadata,
-        ))
+        let channel = self.declare_channel(id)?;
+        if channel.is_some() || self.contents.channels.contains_key(&id) {
+            self.channels.insert(id, channel);
+        }
+        Ok(channel)
+    }
+
+    /// Declares a channel under its old number; `None` if nothing says what it is.
+    fn declare_channel(&mut self, id: u16) -> Result<Option<u16>, Fault> {
+        let Some(schema_id) = self.contents.channels.get(&id).map(|channel| channel.schema_id) else { return Ok(None) };
+        if schema_id != 0 && self.declare_schema(schema_id)?.is_none() {
+            return Ok(None);
+        }
+        let Some(channel) = self.contents.channels.get(&id) else { return Ok(None) };
+        let (topic, encoding) = (&channel.topic, &channel.message_encoding);
+        unless_write_failed(self.mcap.add_channel_with_id(id, schema_id, topic, encoding, &channel.metadata))
+    }
+
+    fn declare_schema(&mut self, id: u16) -> Result<Option<u16>, Fault> {
+        let Some(schema) = self.contents.schemas.get(&id) else { return Ok(None) };
+        let header = &schema.header;
+        unless_write_failed(self.mcap.add_schema_with_id(header.id, &header.name, &header.encoding, &schema.data))
     }
 
     fn take_attachment(&mut self, records: &mut Records, frame: &Frame) -> Result<(), Fault> {
