@@ -51,24 +51,16 @@ enum Watch {
 
 const WATCHED: [Watch; 4] = [Watch::Radial, Watch::Normal, Watch::Tangential, Watch::Coupled];
 
-/// The place of the greatest demand among samples.
-#[derive(Clone, Copy)]
-struct Worst {
-    demand: Demand,
-    /// Measure along the blend, -1 to 1.
-    place: f64,
-}
-
 /// Limits of a blend.
 pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
     let scan = Scan::new(rules, blend);
-    let worst = scan.sample();
+    let samples = scan.sample();
     let (ra, rj) = (rules.radial_acceleration_share, rules.radial_jerk_share);
     let velocity = rules.largest(|axis, limits| scan.tangent(axis) / limits.velocity_max_lu_s);
     let acceleration = rules.largest(|axis, limits| scan.tangent(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
     let jerk = rules.largest(|axis, limits| scan.tangent(axis) / ((1.0 - rj) * limits.transition_jerk_max_lu_s3));
-    let coupled = worst[Watch::Coupled as usize].demand;
-    let safe = scan.safe_feed(&worst);
+    let coupled = greatest(&samples, Watch::Coupled);
+    let safe = scan.safe_feed(&samples);
     let geometric = match rules.blend_law {
         BlendLaw::Limits => safe,
         // "published" has the same entry; its step law is refused with the machine file.
@@ -127,25 +119,17 @@ impl<'a> Scan<'a> {
         self.blend.shape(0.5 * (1.0 + w))
     }
 
-    /// The greatest demands of all samples.
-    fn sample(&self) -> [Worst; WATCHED.len()] {
-        let mut worst = WATCHED.map(|_| Worst { demand: Demand { ratio: 0.0, axis: AxisId::new(0) }, place: 0.0 });
-        let steps = (self.range / SAMPLE_STEP).ceil().max(4.0) as u32;
-        let mut look = |place: f64, point: &BlendPoint| {
-            for (watch, worst) in WATCHED.into_iter().zip(&mut worst) {
-                let demand = self.demand(watch, point);
-                if demand.ratio > worst.demand.ratio {
-                    *worst = Worst { demand, place };
-                }
-            }
-        };
-        for i in 0..=steps {
-            let place = f64::from(i) / f64::from(steps);
-            let point = self.point(place);
-            look(-place, &self.mirrored(&point));
-            look(place, &point);
+    /// The demands from place -1 to 1 at equal distances.
+    fn sample(&self) -> Vec<[Demand; WATCHED.len()]> {
+        let steps = (self.range / SAMPLE_STEP).ceil().max(4.0) as usize;
+        let look = |point: &BlendPoint| WATCHED.map(|watch| self.demand(watch, point));
+        let mut samples = vec![look(&self.point(0.0)); 2 * steps + 1];
+        for i in 1..=steps {
+            let point = self.point(i as f64 / steps as f64);
+            samples[steps + i] = look(&point);
+            samples[steps - i] = look(&self.mirrored(&point));
         }
-        worst
+        samples
     }
 
     /// The point as far before the middle as `point` is after it.
@@ -180,29 +164,44 @@ impl<'a> Scan<'a> {
     }
 
     /// The highest constant feed at which (c), (d) and (e) hold all along.
-    fn safe_feed(&self, worst: &[Worst; WATCHED.len()]) -> SpeedCap {
+    fn safe_feed(&self, samples: &[[Demand; WATCHED.len()]]) -> SpeedCap {
         let geometric = [Watch::Radial, Watch::Normal, Watch::Tangential];
-        let sampled = geometric.map(|watch| geometric_cap(watch, worst[watch as usize].demand));
+        let sampled = geometric.map(|watch| geometric_cap(watch, greatest(samples, watch)));
         let lowest_lu_s = sampled.iter().fold(f64::INFINITY, |low, cap| low.min(cap.velocity_lu_s));
-        let mut safe: Option<SpeedCap> = None;
-        for (watch, sampled) in geometric.into_iter().zip(sampled) {
+        let mut safe = sampled[0];
+        for (watch, cap) in geometric.into_iter().zip(sampled) {
+            safe = safe.min(cap);
             // One that the samples put higher than their error cannot be the lowest.
-            let cap = if sampled.velocity_lu_s <= lowest_lu_s * SAMPLE_RESERVE_RATIO {
-                geometric_cap(watch, self.searched(watch, worst[watch as usize]))
-            } else {
-                sampled
-            };
-            safe = Some(safe.map_or(cap, |safe| safe.min(cap)));
+            if cap.velocity_lu_s <= lowest_lu_s * SAMPLE_RESERVE_RATIO {
+                safe = safe.min(geometric_cap(watch, self.greatest_between(samples, watch)));
+            }
         }
-        safe.unwrap_or(sampled[0])
+        safe
     }
 
-    /// The greatest demand next to the worst sample, by golden section, with the reserve for what that misses.
-    fn searched(&self, watch: Watch, worst: Worst) -> Demand {
+    /// The greatest demand, next to any sample that may be the nearest to it, with the reserve for what the search misses.
+    fn greatest_between(&self, samples: &[[Demand; WATCHED.len()]], watch: Watch) -> Demand {
+        let sampled = greatest(samples, watch);
+        let ratio = |i: usize| samples.get(i).map_or(0.0, |sample| sample[watch as usize].ratio);
+        let step = 2.0 / (samples.len() - 1) as f64;
+        let mut found = sampled;
+        for i in 0..samples.len() {
+            let peak = ratio(i) >= ratio(i + 1) && ratio(i) >= ratio(i.wrapping_sub(1));
+            if peak && ratio(i) * SAMPLE_RESERVE_RATIO >= sampled.ratio {
+                let near = self.searched(watch, i as f64 * step - 1.0, step);
+                if near.ratio > found.ratio {
+                    found = near;
+                }
+            }
+        }
+        Demand { ratio: found.ratio * SEARCH_RESERVE_RATIO, ..found }
+    }
+
+    /// The greatest demand within a step of a place, by golden section.
+    fn searched(&self, watch: Watch, place: f64, step: f64) -> Demand {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let step = SAMPLE_STEP / self.range;
-        let (mut low, mut high) = ((worst.place - step).max(-1.0), (worst.place + step).min(1.0));
-        let mut greatest = worst.demand;
+        let (mut low, mut high) = ((place - step).max(-1.0), (place + step).min(1.0));
+        let mut greatest = self.demand(watch, &self.point(place));
         let mut look = |place: f64| {
             let demand = self.demand(watch, &self.point(place));
             if demand.ratio > greatest.ratio {
@@ -223,8 +222,17 @@ impl<'a> Scan<'a> {
                 at_b = look(b);
             }
         }
-        Demand { ratio: greatest.ratio * SEARCH_RESERVE_RATIO, ..greatest }
+        greatest
     }
+}
+
+/// The greatest of the sampled demands.
+fn greatest(samples: &[[Demand; WATCHED.len()]], watch: Watch) -> Demand {
+    let demands = samples.iter().map(|sample| sample[watch as usize]);
+    demands.fold(
+        Demand { ratio: 0.0, axis: AxisId::new(0) },
+        |most, next| if next.ratio > most.ratio { next } else { most },
+    )
 }
 
 /// The feed at which a geometric demand reaches its limit.

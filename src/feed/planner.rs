@@ -341,11 +341,8 @@ impl Motion {
     fn highest_entry(&self, exit: Planned) -> Planned {
         match self {
             Self::Moves { limits, length_lu, .. } => {
-                let cap = if exit.settled {
-                    limits.reach(exit.cap, *length_lu)
-                } else {
-                    limits.brake(exit.cap, *length_lu)
-                };
+                let cap =
+                    if exit.settled { limits.reach(exit.cap, *length_lu) } else { limits.brake(exit.cap, *length_lu) };
                 // Where the path rests for good it is the braking that holds; any other junction passes on its own reason.
                 let limit = if exit == REST { cap.limit } else { exit.cap.limit };
                 Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }

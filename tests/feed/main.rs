@@ -1,4 +1,5 @@
 //! Tests of the room `feed`: closed forms, published figures, limits seen from outside.
 
 mod profile;
+mod published;
 mod support;
