@@ -2,6 +2,33 @@
 //!
 //! In: [`crate::program`] blocks, the machine's axis names and defaults. Out: a stream of [`Move`]s in the basic coordinate
 //! system, one at a time, and diagnostics. Does not know corners, speeds or time.
+//!
+//! Decisions where the language leaves room:
+//!
+//! * Words of a block take effect from left to right (assignments, G functions), then feed, frame, M6, motion, M0/M1/M2/M30.
+//! * A block that moves nothing makes no move, unless it outputs something.
+//! * Zero offsets (G54 and so on) are all 0 until there is a table of them. SUPA, G53 and G153 suppress TRANS for their block.
+//! * G70 converts positions, arcs and frames; G700 also F, CTOL and ADIS. Rotary axes are never converted.
+//! * With G91 or IC() an axis also makes good a change of TRANS since its last motion (SD42440 = 1, the control's default).
+//! * Absolute positions of an endless axis are taken as they are; DC, ACP and ACN choose the way round.
+//! * Skip levels (`/`) are not active: these blocks are executed.
+//! * G601 is what is done; G602 and G603 are reported. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
+mod arc;
+mod block;
+mod check;
+mod evaluate;
+mod flow;
+mod listing;
+mod modal;
+mod motion;
+mod run;
+mod value;
+mod variables;
 mod wire;
+
+pub use crate::program::{ProgramSource, known_words};
+pub use check::check;
+pub use listing::{Listing, feed_per_minute, format_move, listing};
+pub use run::Interpreter;
 pub use wire::*;

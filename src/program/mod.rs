@@ -1,6 +1,30 @@
 //! NC text: bytes -> lines -> tokens -> [`Block`]s and diagnostics with spans.
 //!
-//! Does not execute anything: expressions and control words stay syntax here.
+//! In: the bytes of a program file, the axis names of the machine. Out: one [`Block`] a line, parsed when it is reached, or a
+//! [`Fault`] with its columns; the [`structure::Structure`] of labels and control words. Does not execute anything: expressions
+//! and control words stay syntax here.
+
+pub mod codes;
+mod dialect;
+mod expression;
+mod lexer;
+mod not_acted_on;
+mod not_built;
+mod parser;
+pub mod plain;
+pub mod source;
+mod statements;
+pub mod structure;
+pub mod syntax;
+pub mod words;
+
+pub use codes::{Columns, Fault, Outcome};
+pub use dialect::Dialect;
+pub use parser::{parse, whole_number};
+pub use source::{Cursor, ProgramSource};
+pub use statements::{TEXT_MAX, block_number, visit_names};
+pub use syntax::Block;
+pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 
 use std::sync::Arc;
 

@@ -1,0 +1,365 @@
+//! Words of a block: what each of them does, and in which order the block acts.
+//!
+//! In: [`Word`]s. Out: modal state, events, the words of a motion for `motion`. Order of action: words from left to right
+//! (assignments, G functions), then F, frame, T and M6, motion with the other outputs, and last M0, M1, M2, M17 or M30.
+
+use super::evaluate::{evaluate, integers, number};
+use super::modal::Motion;
+use super::motion::{AxisWord, MotionWords};
+use super::run::Interpreter;
+use super::value::Value;
+use super::wire::{Event, MoveKind};
+use crate::base::units::S_PER_MIN;
+use crate::machine::{AccelerationMode, PathMode};
+use crate::program::syntax::{Address, AddressValue, Form, Target, Word, WordKind};
+use crate::program::words::{GFunction, Keyword, Role, role};
+use crate::program::{Columns, Fault, Outcome, codes, whole_number};
+
+/// M6: the tool change comes before the motion of its block, at rest.
+const TOOL_CHANGE: u32 = 6;
+/// M0, M1: stop. M2, M17, M30: end. They come after the motion of their block.
+const STOPS: [u32; 5] = [0, 1, 2, 17, 30];
+const ENDS: [u32; 3] = [2, 17, 30];
+
+/// What the words of a block come to.
+#[derive(Default)]
+struct Collected {
+    motion: MotionWords,
+    /// G groups seen, one bit each.
+    groups: u64,
+    addresses: Vec<Address>,
+    feed: Option<(f64, Columns)>,
+    spindle_speed: Option<(f64, Columns)>,
+    frame: Option<(Keyword, Columns)>,
+    dwell: Option<Columns>,
+    /// Output with the motion.
+    events: Vec<Event>,
+    /// T and M6: output before the motion where the block has an M6.
+    tool_events: Vec<Event>,
+    tool_change: bool,
+    /// M0, M1, M2, M17, M30.
+    last: Vec<Event>,
+    ends: bool,
+    stops: bool,
+}
+
+impl Interpreter {
+    /// Executes the words of a block.
+    pub(super) fn words(&mut self, words: &[Word]) -> Outcome<()> {
+        let mut block = Collected::default();
+        for word in words {
+            self.word(word, &mut block)?;
+        }
+        if let Some(columns) = block.dwell.take() {
+            self.dwell(&mut block, &columns)?;
+        } else {
+            self.take_feed(&mut block)?;
+            if let Some((frame, columns)) = block.frame.take() {
+                self.frame(frame, &mut block, &columns)?;
+            }
+            self.act(&mut block)?;
+        }
+        if block.stops {
+            self.emit_function(Vec::new(), true);
+        }
+        if !block.last.is_empty() {
+            self.emit_function(block.last, true);
+        }
+        if block.ends {
+            self.end();
+        }
+        Ok(())
+    }
+
+    fn act(&mut self, block: &mut Collected) -> Outcome<()> {
+        let mut events = std::mem::take(&mut block.events);
+        if block.tool_change {
+            let tool_events = std::mem::take(&mut block.tool_events);
+            self.emit_function(tool_events, true);
+        }
+        if block.motion.any() {
+            self.motion(&block.motion, &mut events)?;
+        }
+        if !events.is_empty() {
+            self.emit_function(events, false);
+        }
+        Ok(())
+    }
+
+    fn word(&mut self, word: &Word, block: &mut Collected) -> Outcome<()> {
+        let columns = &word.columns;
+        match &word.kind {
+            WordKind::G(function) => self.g_function(*function, columns, block),
+            WordKind::Address(address, value) => self.address(*address, value, columns, block),
+            WordKind::Keyword(keyword) => {
+                self.keyword(*keyword, columns, block);
+                Ok(())
+            }
+            WordKind::Message(text) => {
+                let text = match text {
+                    Some(text) => evaluate(text, &self.variables)?.text(),
+                    None => "".into(),
+                };
+                block.events.push(Event::Message(text));
+                Ok(())
+            }
+            WordKind::Assign(target, value) => {
+                let result = evaluate(value, &self.variables)?;
+                self.assign(target, &result, columns, &value.columns)
+            }
+            WordKind::Fill(target, filling) => match target {
+                Target::Variable { name, indices } => {
+                    let indices = integers(indices, &self.variables)?;
+                    self.fill(name, &indices, filling, columns)
+                }
+                Target::Parameter(_) => {
+                    Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "SET and REP fill arrays")
+                        .label("an R parameter is none"))
+                }
+            },
+            WordKind::Silent => Ok(()),
+            WordKind::NotActedOn(entry) => {
+                self.report_word(entry, columns);
+                if entry.word == "DRIVE" {
+                    self.modal.acceleration_mode = AccelerationMode::Brisk;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn g_function(&mut self, function: GFunction, columns: &Columns, block: &mut Collected) -> Outcome<()> {
+        let group = function.group();
+        if group > 0 {
+            let bit = 1 << group;
+            if block.groups & bit != 0 {
+                return Err(Fault::new(
+                    codes::TWICE,
+                    columns.clone(),
+                    format!("a second G function of group {group} in this block"),
+                )
+                .label("contradicts the first"));
+            }
+            block.groups |= bit;
+        }
+        match function {
+            GFunction::Rapid => self.modal.motion = Motion::Rapid,
+            GFunction::Line => self.modal.motion = Motion::Line,
+            GFunction::Clockwise => self.modal.motion = Motion::Clockwise,
+            GFunction::CounterClockwise => self.modal.motion = Motion::CounterClockwise,
+            GFunction::Dwell => block.dwell = Some(columns.clone()),
+            GFunction::ExactStopOnce => block.motion.exact_stop = true,
+            GFunction::Plane(plane) => self.modal.plane = plane,
+            GFunction::SuppressFrames => block.motion.suppress_frames = true,
+            // All zero offsets are 0.
+            GFunction::ZeroOffset(_) | GFunction::Silent(_) => {}
+            GFunction::PathMode(mode) => self.modal.path_mode = mode,
+            GFunction::PathModeAsG642(entry) => {
+                self.report_word(entry, columns);
+                self.modal.path_mode = PathMode::G642;
+            }
+            GFunction::Measure(measure) => self.modal.measure = measure,
+            GFunction::Absolute(absolute) => self.modal.absolute = absolute,
+            GFunction::NotActedOn(entry, _) => self.report_word(entry, columns),
+        }
+        Ok(())
+    }
+
+    fn keyword(&mut self, keyword: Keyword, columns: &Columns, block: &mut Collected) {
+        match keyword {
+            Keyword::Soft => self.modal.acceleration_mode = AccelerationMode::Soft,
+            Keyword::Brisk => self.modal.acceleration_mode = AccelerationMode::Brisk,
+            Keyword::FeedforwardOn => self.modal.feedforward_active = true,
+            Keyword::FeedforwardOff => self.modal.feedforward_active = false,
+            Keyword::SuppressFrames => block.motion.suppress_frames = true,
+            Keyword::Trans | Keyword::AddTrans | Keyword::ClearFrame => block.frame = Some((keyword, columns.clone())),
+            Keyword::StopPreparation => block.stops = true,
+            Keyword::Return => block.ends = true,
+        }
+    }
+
+    fn address(
+        &mut self,
+        address: Address,
+        value: &AddressValue,
+        columns: &Columns,
+        block: &mut Collected,
+    ) -> Outcome<()> {
+        if address != Address::M {
+            if block.addresses.contains(&address) {
+                return Err(Fault::new(codes::TWICE, columns.clone(), "this address is programmed twice in the block")
+                    .label("programmed again"));
+            }
+            block.addresses.push(address);
+        }
+        if address == Address::Tool {
+            let tool = self.tool(value)?;
+            block.tool_events.push(tool.clone());
+            block.events.push(tool);
+            return Ok(());
+        }
+        let typed = number(&value.value, &self.variables)?;
+        let plain = matches!(address, Address::Axis(_) | Address::Centre(_)) || value.form == Form::Modal;
+        if !plain {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "AC, IC and their kin are for axes")
+                .label("expected a plain value"));
+        }
+        match address {
+            Address::Axis(axis) => {
+                block.motion.axes[axis] = Some(AxisWord { typed, form: value.form, columns: columns.clone() });
+            }
+            Address::Centre(index) => {
+                block.motion.centre[usize::from(index)] =
+                    Some(AxisWord { typed, form: value.form, columns: columns.clone() });
+            }
+            Address::Radius => block.motion.radius = Some((typed, columns.clone())),
+            Address::Turn => block.motion.turns = whole(typed, columns, "TURN")?,
+            Address::Feed => block.feed = Some((typed, columns.clone())),
+            Address::SpindleSpeed => {
+                if typed < 0.0 {
+                    return Err(Fault::new(
+                        codes::OUT_OF_RANGE,
+                        columns.clone(),
+                        format!("spindle speed {typed} rpm is below 0"),
+                    )
+                    .label("expected 0 or more")
+                    .help("M3 and M4 give the direction"));
+                }
+                block.spindle_speed = Some((typed, columns.clone()));
+                block.events.push(Event::SpindleSpeed { speed_rpm: typed });
+            }
+            Address::Edge => block.events.push(Event::Edge(whole(typed, columns, "D")?)),
+            Address::M => m_function(whole(typed, columns, "M")?, block),
+            Address::RoundingDistance => self.modal.rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?),
+            Address::RapidRoundingDistance => {
+                self.modal.rapid_rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?)
+            }
+            // A negative tolerance deletes it: the machine's holds again.
+            Address::ContourTolerance => {
+                self.modal.contour_tolerance_mm = (typed >= 0.0).then(|| self.modal.length_mm(typed));
+            }
+            Address::Tool => {}
+        }
+        Ok(())
+    }
+
+    fn not_negative_mm(&self, typed: f64, columns: &Columns) -> Outcome<f64> {
+        if typed >= 0.0 {
+            return Ok(self.modal.length_mm(typed));
+        }
+        Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("a rounding distance of {typed} is below 0"))
+            .label("expected 0 or more"))
+    }
+
+    fn tool(&self, value: &AddressValue) -> Outcome<Event> {
+        let text = match evaluate(&value.value, &self.variables)? {
+            Value::Text(text) => text,
+            number => whole(number.number(&value.value.columns)?, &value.value.columns, "T")?.to_string().into(),
+        };
+        Ok(Event::Tool(text))
+    }
+
+    fn take_feed(&mut self, block: &mut Collected) -> Outcome<()> {
+        if let Some((typed, columns)) = block.feed.take() {
+            if typed <= 0.0 {
+                return Err(Fault::new(codes::BAD_FEED, columns, format!("feed {typed} is not above 0"))
+                    .label("expected more than 0"));
+            }
+            self.modal.feed = Some(self.modal.programmed_feed(typed));
+        }
+        if let Some((speed_rpm, _)) = block.spindle_speed {
+            self.modal.spindle_speed_rpm = speed_rpm;
+        }
+        Ok(())
+    }
+
+    /// G4 F (seconds) or G4 S (revolutions): F and S of the path stay as they are.
+    fn dwell(&mut self, block: &mut Collected, columns: &Columns) -> Outcome<()> {
+        if block.motion.any() {
+            return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "G4 and a motion in one block")
+                .label("expected a block of its own"));
+        }
+        let time_s = match (block.feed.take(), block.spindle_speed.take()) {
+            (Some((time_s, _)), None) if time_s >= 0.0 => time_s,
+            (Some((time_s, columns)), _) => {
+                return Err(Fault::new(codes::DWELL, columns, format!("a wait of {time_s} s"))
+                    .label("expected 0 or more, and not F and S together"));
+            }
+            (None, Some((revolutions, columns))) => {
+                if self.modal.spindle_speed_rpm <= 0.0 {
+                    return Err(Fault::new(
+                        codes::DWELL,
+                        columns,
+                        "G4 S counts revolutions, but no spindle speed is programmed",
+                    )
+                    .label("no S before this block"));
+                }
+                block.events.retain(|event| !matches!(event, Event::SpindleSpeed { .. }));
+                revolutions / self.modal.spindle_speed_rpm * S_PER_MIN
+            }
+            (None, None) => {
+                return Err(Fault::new(codes::DWELL, columns.clone(), "G4 without a time")
+                    .label("expected F with seconds or S with revolutions"));
+            }
+        };
+        let mut events = std::mem::take(&mut block.tool_events);
+        if !block.tool_change {
+            events = std::mem::take(&mut block.events);
+        } else {
+            events.append(&mut block.events);
+        }
+        self.emit(MoveKind::Dwell { time_s }, self.standing_feed(), false, events);
+        Ok(())
+    }
+
+    /// TRANS replaces the whole translation, ATRANS adds to it; axis words are offsets here.
+    fn frame(&mut self, frame: Keyword, block: &mut Collected, columns: &Columns) -> Outcome<()> {
+        let words = std::mem::take(&mut block.motion);
+        if words.has_circle_words() {
+            return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "a frame and a circle in one block")
+                .label("expected a block of its own"));
+        }
+        if frame != Keyword::AddTrans {
+            self.modal.translation_lu = crate::base::AxisVector::zero();
+        }
+        let machine = self.machine.clone();
+        for id in machine.axis_ids() {
+            if let Some(word) = &words.axes[id] {
+                self.modal.translation_lu[id] += self.modal.position_lu(machine.axis(id).kind, word.typed);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn m_function(number: u32, block: &mut Collected) {
+    let event = Event::MFunction(number);
+    if STOPS.contains(&number) {
+        block.last.push(event);
+        block.ends |= ENDS.contains(&number);
+        return;
+    }
+    if number == TOOL_CHANGE {
+        block.tool_change = true;
+        // What stands before it is output at the tool change; a T in the block has been noted twice.
+        block.events.retain(|event| !matches!(event, Event::Tool(_)));
+        block.tool_events.push(event);
+        return;
+    }
+    block.events.push(event);
+}
+
+fn whole(typed: f64, columns: &Columns, address: &str) -> Outcome<u32> {
+    whole_number(typed).ok_or_else(|| {
+        Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{address}{typed} is not possible"))
+            .label("expected a whole number from 0 to 2147483647")
+    })
+}
+
+/// The entry of a word that is not acted on.
+pub(super) fn not_acted_on(word: &str) -> Option<&'static crate::program::NotActedOn> {
+    match role(word) {
+        Some(Role::NotActedOn(entry)) => Some(entry),
+        _ => None,
+    }
+}

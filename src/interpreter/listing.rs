@@ -1,0 +1,185 @@
+//! Moves as text: the `.moves` format.
+//!
+//! In: [`Move`]s. Out: one line a move, stable from version to version. Words of a line, separated by one blank:
+//!
+//! ```text
+//! 12 arc X50 Y0 Z-2 F3000 XY C0,0 R50 sweep=360 [G642 CTOL0.1 SOFT FFWON] S10000 M3
+//! |  |   |          |     |                     |                         events, in order of output
+//! |  |   |          |     |                     modes, where they differ from the line before
+//! |  |   |          |     arcs: plane, centre, radius (mm), swept angle (deg, positive = G3)
+//! |  |   |          F in mm/min (deg/min where only rotary axes move), or `rapid`
+//! |  |   all axes at the end, after all frames: mm, deg
+//! |  rapid, line, arc, dwell, function
+//! line of the program
+//! ```
+//!
+//! A dwell adds `4s`, a function that brings the path to rest adds `stops`. Numbers have at most six decimals and no trailing
+//! zeros. Does not read them back.
+
+use super::value::trimmed;
+use super::wire::{Event, Feed, Modes, Move, MoveKind};
+use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
+use crate::base::{AxisId, AxisKind, PartPoint};
+use crate::machine::{AccelerationMode, Machine, PathMode};
+use std::fmt::Write;
+
+/// Writes moves line by line; remembers the modes of the last one.
+#[derive(Clone, Debug)]
+pub struct Listing<'m> {
+    machine: &'m Machine,
+    modes: Option<Modes>,
+    start: PartPoint,
+}
+
+impl<'m> Listing<'m> {
+    /// A listing of moves on `machine`, from its home position.
+    pub fn new(machine: &'m Machine) -> Self {
+        let mut start = PartPoint::default();
+        for id in machine.axis_ids() {
+            start.0[id] = machine.axis(id).home_lu;
+        }
+        Self { machine, modes: None, start }
+    }
+
+    /// The line of the next move, without a line end.
+    pub fn line(&mut self, next: &Move) -> String {
+        let modes = (self.modes != Some(next.modes)).then(|| self.modes_text(&next.modes));
+        self.modes = Some(next.modes);
+        let start = std::mem::replace(&mut self.start, next.end);
+        format_with(self.machine, start, next, modes.as_deref())
+    }
+
+    /// Only what differs from the line before.
+    fn modes_text(&self, modes: &Modes) -> String {
+        let before = self.modes.as_ref();
+        let mut words = Vec::new();
+        if before.is_none_or(|before| before.path_mode != modes.path_mode) {
+            words.push(path_mode_name(modes.path_mode).to_owned());
+        }
+        let length = |name: &str, length_mm: Option<f64>| match length_mm {
+            Some(length_mm) => format!("{name}{}", trimmed(length_mm)),
+            None => format!("{name}-"),
+        };
+        if before.map_or(modes.contour_tolerance_mm.is_some(), |before| {
+            before.contour_tolerance_mm != modes.contour_tolerance_mm
+        }) {
+            words.push(length("CTOL", modes.contour_tolerance_mm));
+        }
+        if before.map_or(modes.rounding_distance_mm.is_some(), |before| {
+            before.rounding_distance_mm != modes.rounding_distance_mm
+        }) {
+            words.push(length("ADIS", modes.rounding_distance_mm));
+        }
+        if before.is_none_or(|before| before.acceleration_mode != modes.acceleration_mode) {
+            words.push(match modes.acceleration_mode {
+                AccelerationMode::Soft => "SOFT".to_owned(),
+                AccelerationMode::Brisk => "BRISK".to_owned(),
+            });
+        }
+        if before.is_none_or(|before| before.feedforward_active != modes.feedforward_active) {
+            words.push(if modes.feedforward_active { "FFWON" } else { "FFWOF" }.to_owned());
+        }
+        words.join(" ")
+    }
+}
+
+/// All moves, one line each.
+pub fn listing<'a>(machine: &Machine, moves: impl IntoIterator<Item = &'a Move>) -> String {
+    let mut listing = Listing::new(machine);
+    moves.into_iter().fold(String::new(), |mut text, next| {
+        text.push_str(&listing.line(next));
+        text.push('\n');
+        text
+    })
+}
+
+/// One move that begins at `start`, without its modes.
+pub fn format_move(machine: &Machine, start: PartPoint, shown: &Move) -> String {
+    format_with(machine, start, shown, None)
+}
+
+/// Feed of a move that begins at `start` as a programmer writes it: mm/min, or deg/min where only rotary axes move. `None` for
+/// rapids, dwells and functions.
+pub fn feed_per_minute(machine: &Machine, start: PartPoint, shown: &Move) -> Option<f64> {
+    let Feed::Path { feed_lu_s } = shown.feed else { return None };
+    let linear = |id: AxisId| machine.axis(id).kind == AxisKind::Linear && start.0[id] != shown.end.0[id];
+    match shown.kind {
+        MoveKind::Line if !machine.axis_ids().any(linear) => Some(deg_from_rad(feed_lu_s) * S_PER_MIN),
+        MoveKind::Line | MoveKind::Arc(_) => Some(mm_min_from_mm_s(feed_lu_s)),
+        MoveKind::Rapid | MoveKind::Dwell { .. } | MoveKind::Function { .. } => None,
+    }
+}
+
+fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<&str>) -> String {
+    let kind = match shown.kind {
+        MoveKind::Rapid => "rapid",
+        MoveKind::Line => "line",
+        MoveKind::Arc(_) => "arc",
+        MoveKind::Dwell { .. } => "dwell",
+        MoveKind::Function { .. } => "function",
+    };
+    let mut text = format!("{} {kind}", shown.block.line);
+    for id in machine.axis_ids() {
+        let axis = machine.axis(id);
+        let end = match axis.kind {
+            AxisKind::Linear => shown.end.0[id],
+            AxisKind::Rotary => deg_from_rad(shown.end.0[id]),
+        };
+        add(&mut text, &named(&axis.name, &trimmed(end)));
+    }
+    match shown.kind {
+        MoveKind::Rapid => add(&mut text, "rapid"),
+        MoveKind::Line | MoveKind::Arc(_) => {
+            let feed = feed_per_minute(machine, start, shown);
+            add(&mut text, &feed.map_or_else(|| "rapid".to_owned(), |feed| format!("F{}", trimmed(feed))));
+        }
+        MoveKind::Dwell { time_s } => add(&mut text, &format!("{}s", trimmed(time_s))),
+        MoveKind::Function { stops: true } => add(&mut text, "stops"),
+        MoveKind::Function { stops: false } => {}
+    }
+    if let MoveKind::Arc(arc) = shown.kind {
+        let name = |id: AxisId| machine.axis(id).name.as_str();
+        let [first, second] = arc.plane;
+        let [a, b] = arc.centre_mm.map(trimmed);
+        let (radius, sweep) = (trimmed(arc.radius_mm), trimmed(deg_from_rad(arc.sweep_rad)));
+        add(&mut text, &format!("{}{} C{a},{b} R{radius} sweep={sweep}", name(first), name(second)));
+    }
+    if let Some(modes) = modes {
+        add(&mut text, &format!("[{modes}]"));
+    }
+    shown.events.iter().for_each(|event| add(&mut text, &event_text(event)));
+    text
+}
+
+fn add(text: &mut String, word: &str) {
+    // Writing to a String cannot fail.
+    let _ = write!(text, " {word}");
+}
+
+/// `X10`, and `X1=10` for names with digits.
+fn named(name: &str, value: &str) -> String {
+    if name.len() == 1 { format!("{name}{value}") } else { format!("{name}={value}") }
+}
+
+fn path_mode_name(mode: PathMode) -> &'static str {
+    match mode {
+        PathMode::ExactStop => "G60",
+        PathMode::G64 => "G64",
+        PathMode::G641 => "G641",
+        PathMode::G642 => "G642",
+        PathMode::G643 => "G643",
+        PathMode::G644 => "G644",
+        PathMode::G645 => "G645",
+    }
+}
+
+fn event_text(event: &Event) -> String {
+    match event {
+        Event::ProgramOpened(opened) => format!("open={:?}", &*opened.name),
+        Event::MFunction(number) => format!("M{number}"),
+        Event::SpindleSpeed { speed_rpm } => format!("S{}", trimmed(*speed_rpm)),
+        Event::Tool(tool) => format!("T={:?}", &**tool),
+        Event::Edge(number) => format!("D{number}"),
+        Event::Message(text) => format!("MSG({:?})", &**text),
+    }
+}

@@ -1,0 +1,118 @@
+//! What the program has said and what still holds: modal G functions, feed, frames.
+//!
+//! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
+
+use super::wire::Modes;
+use crate::base::units::S_PER_MIN;
+use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
+use crate::base::{AxisKind, AxisVector};
+use crate::machine::{AccelerationMode, FeedSettings, PathMode};
+use crate::program::words::{Measure, Plane};
+
+/// G group 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// G0.
+    Rapid,
+    /// G1.
+    Line,
+    /// G2.
+    Clockwise,
+    /// G3.
+    CounterClockwise,
+}
+
+/// F word, ready for both kinds of motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProgrammedFeed {
+    /// Where a linear axis moves.
+    pub linear_mm_s: f64,
+    /// Where only rotary axes move.
+    pub rotary_rad_s: f64,
+}
+
+/// Modal state.
+#[derive(Clone, Debug)]
+pub struct Modal {
+    /// G0 to G3.
+    pub motion: Motion,
+    /// G17 to G19.
+    pub plane: Plane,
+    /// G90.
+    pub absolute: bool,
+    /// G70, G71, G700, G710.
+    pub measure: Measure,
+    /// G60, G64, G641, G642.
+    pub path_mode: PathMode,
+    /// CTOL.
+    pub contour_tolerance_mm: Option<f64>,
+    /// ADIS.
+    pub rounding_distance_mm: Option<f64>,
+    /// ADISPOS.
+    pub rapid_rounding_distance_mm: Option<f64>,
+    /// SOFT or BRISK.
+    pub acceleration_mode: AccelerationMode,
+    /// FFWON or FFWOF.
+    pub feedforward_active: bool,
+    /// F; `None` before the first.
+    pub feed: Option<ProgrammedFeed>,
+    /// S; 0 before the first.
+    pub spindle_speed_rpm: f64,
+    /// TRANS and ATRANS.
+    pub translation_lu: AxisVector,
+}
+
+impl Modal {
+    /// State at program start: G1 G17 G90 G94 G71, and what the machine file says.
+    pub fn new(settings: &FeedSettings) -> Self {
+        Self {
+            motion: Motion::Line,
+            plane: Plane::G17,
+            absolute: true,
+            measure: Measure::Metric,
+            path_mode: settings.default_path_mode,
+            contour_tolerance_mm: None,
+            rounding_distance_mm: None,
+            rapid_rounding_distance_mm: None,
+            acceleration_mode: settings.default_acceleration_mode,
+            feedforward_active: true,
+            feed: None,
+            spindle_speed_rpm: 0.0,
+            translation_lu: AxisVector::zero(),
+        }
+    }
+
+    /// Modes for the wire; `exact_stop` = G9 in this block.
+    pub fn modes(&self, exact_stop: bool) -> Modes {
+        let rapid = self.motion == Motion::Rapid;
+        Modes {
+            path_mode: if exact_stop { PathMode::ExactStop } else { self.path_mode },
+            contour_tolerance_mm: self.contour_tolerance_mm,
+            rounding_distance_mm: if rapid { self.rapid_rounding_distance_mm } else { self.rounding_distance_mm },
+            acceleration_mode: self.acceleration_mode,
+            feedforward_active: self.feedforward_active,
+        }
+    }
+
+    /// A typed position in internal units. G70 and G700: linear axes in inch; rotary axes always in degrees.
+    pub fn position_lu(&self, kind: AxisKind, typed: f64) -> f64 {
+        match (kind, self.measure) {
+            (AxisKind::Rotary, _) => rad_from_deg(typed),
+            (AxisKind::Linear, Measure::Metric) => typed,
+            (AxisKind::Linear, Measure::InchGeometry | Measure::Inch) => mm_from_inch(typed),
+        }
+    }
+
+    /// A typed length that is no position (CTOL, ADIS): inch with G700 only.
+    pub fn length_mm(&self, typed: f64) -> f64 {
+        if self.measure == Measure::Inch { mm_from_inch(typed) } else { typed }
+    }
+
+    /// A typed feed: mm/min (inch/min with G700), and deg/min where only rotary axes move.
+    pub fn programmed_feed(&self, typed: f64) -> ProgrammedFeed {
+        ProgrammedFeed {
+            linear_mm_s: mm_s_from_mm_min(self.length_mm(typed)),
+            rotary_rad_s: rad_from_deg(typed) / S_PER_MIN,
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! Axis words -> end point, line, rapid or arc.
+//!
+//! In: the axis and circle words of a block, the modal state. Out: a [`super::Move`] in the basic coordinate system. Frames are
+//! translations only. Checks travel at programmed end points (a warning: the control would stop with alarm 10720).
+
+use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
+use super::block::not_acted_on;
+use super::modal::Motion;
+use super::run::Interpreter;
+use super::value::trimmed;
+use super::wire::{ArcGeometry, Event, Feed, MoveKind};
+use crate::base::units::deg_from_rad;
+use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
+use crate::program::plain::PlainBlock;
+use crate::program::syntax::Form;
+use crate::program::words::Plane;
+use crate::program::{Columns, Fault, Outcome, codes};
+use std::f64::consts::{PI, TAU};
+
+/// Angles nearer than this are the same for DC, ACP and ACN: below any digit that a program carries.
+const SAME_ANGLE_RAD: f64 = 1e-9;
+
+/// An axis word (or I, J, K) as typed.
+#[derive(Clone, Debug)]
+pub(super) struct AxisWord {
+    /// mm, inch or degrees.
+    pub typed: f64,
+    /// AC, IC, ...
+    pub form: Form,
+    /// Marked bytes.
+    pub columns: Columns,
+}
+
+/// What a block says about motion.
+#[derive(Clone, Debug)]
+pub(super) struct MotionWords {
+    /// Axis words.
+    pub axes: PerAxis<Option<AxisWord>>,
+    /// I, J, K.
+    pub centre: [Option<AxisWord>; 3],
+    /// CR.
+    pub radius: Option<(f64, Columns)>,
+    /// TURN.
+    pub turns: u32,
+    /// G9.
+    pub exact_stop: bool,
+    /// SUPA, G53, G153.
+    pub suppress_frames: bool,
+}
+
+impl Default for MotionWords {
+    fn default() -> Self {
+        Self {
+            axes: PerAxis::from_fn(|_| None),
+            centre: [None, None, None],
+            radius: None,
+            turns: 0,
+            exact_stop: false,
+            suppress_frames: false,
+        }
+    }
+}
+
+impl MotionWords {
+    /// True if the block moves.
+    pub fn any(&self) -> bool {
+        self.axes.as_slice().iter().any(Option::is_some) || self.has_circle_words()
+    }
+
+    /// True with I, J, K or CR.
+    pub fn has_circle_words(&self) -> bool {
+        self.centre.iter().any(Option::is_some) || self.radius.is_some()
+    }
+
+    /// Columns of all words of the motion.
+    fn columns(&self) -> Columns {
+        let axes =
+            self.axes.as_slice().iter().flatten().chain(self.centre.iter().flatten()).map(|word| word.columns.clone());
+        let all = axes.chain(self.radius.iter().map(|(_, columns)| columns.clone()));
+        all.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
+    }
+}
+
+impl Interpreter {
+    /// Moves; takes `events` along if it does.
+    pub(super) fn motion(&mut self, words: &MotionWords, events: &mut Vec<Event>) -> Outcome<()> {
+        let start = self.position;
+        let end = self.end_point(words)?;
+        let circle = matches!(self.modal.motion, Motion::Clockwise | Motion::CounterClockwise);
+        if !circle && words.has_circle_words() {
+            return Err(Fault::new(codes::BAD_BLOCK, words.columns(), "I, J, K or CR without G2 or G3")
+                .label("only for circles"));
+        }
+        if self.modal.motion != Motion::Rapid && self.modal.feed.is_none() {
+            return Err(Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
+                .label("expected F in this block or before it")
+                .help("write F with mm/min, or G0 for a rapid"));
+        }
+        let kind = match self.modal.motion {
+            Motion::Rapid => MoveKind::Rapid,
+            Motion::Line => MoveKind::Line,
+            Motion::Clockwise | Motion::CounterClockwise => MoveKind::Arc(self.arc(words, end)?),
+        };
+        self.check_travel(words, end);
+        self.note_applied(words);
+        if end == start && !matches!(kind, MoveKind::Arc(_)) {
+            return Ok(());
+        }
+        self.position = end;
+        let feed = self.feed_of(start, end, matches!(kind, MoveKind::Arc(_)));
+        self.emit(kind, feed, words.exact_stop, std::mem::take(events));
+        Ok(())
+    }
+
+    /// The fast path: a straight move without anything remarkable. False if the block needs the long way.
+    pub(super) fn plain_move(&mut self, block: &PlainBlock) -> bool {
+        let motion = match block.rapid {
+            Some(true) => Motion::Rapid,
+            Some(false) => Motion::Line,
+            None => self.modal.motion,
+        };
+        let feed = match block.feed {
+            Some(typed) if typed > 0.0 => Some(self.modal.programmed_feed(typed)),
+            Some(_) => return false,
+            None => self.modal.feed,
+        };
+        let straight = motion == Motion::Rapid || (motion == Motion::Line && feed.is_some());
+        let start = self.position;
+        let mut end = start;
+        let machine = &self.machine;
+        for id in machine.axis_ids() {
+            let Some(typed) = block.axes[id] else { continue };
+            let axis = machine.axis(id);
+            let value_lu = self.modal.position_lu(axis.kind, typed);
+            let offset_lu = self.modal.translation_lu[id];
+            end.0[id] = if self.modal.absolute {
+                value_lu + offset_lu
+            } else {
+                end.0[id] + value_lu + offset_lu - self.applied_lu[id]
+            };
+            if outside(axis.travel_lu, end.0[id]).is_some() {
+                return false;
+            }
+        }
+        if end != start && !straight {
+            return false;
+        }
+        for id in machine.axis_ids() {
+            if block.axes[id].is_some() {
+                self.applied_lu[id] = self.modal.translation_lu[id];
+            }
+        }
+        self.number += 1;
+        self.modal.motion = motion;
+        self.modal.feed = feed;
+        if end != start {
+            self.position = end;
+            let kind = if motion == Motion::Rapid { MoveKind::Rapid } else { MoveKind::Line };
+            let feed = self.feed_of(start, end, false);
+            self.emit(kind, feed, false, Vec::new());
+        }
+        true
+    }
+
+    /// Feed of moves that stand still.
+    pub(super) fn standing_feed(&self) -> Feed {
+        match (self.modal.motion, self.modal.feed) {
+            (Motion::Rapid, _) | (_, None) => Feed::Rapid,
+            (_, Some(feed)) => Feed::Path { feed_lu_s: feed.linear_mm_s },
+        }
+    }
+
+    fn feed_of(&self, start: PartPoint, end: PartPoint, is_arc: bool) -> Feed {
+        let Some(feed) = self.modal.feed.filter(|_| self.modal.motion != Motion::Rapid) else { return Feed::Rapid };
+        let linear_moves = |id: AxisId| self.machine.axis(id).kind == AxisKind::Linear && end.0[id] != start.0[id];
+        let linear = is_arc || self.machine.axis_ids().any(linear_moves);
+        Feed::Path { feed_lu_s: if linear { feed.linear_mm_s } else { feed.rotary_rad_s } }
+    }
+
+    /// All axes at the end of the block.
+    fn end_point(&self, words: &MotionWords) -> Outcome<PartPoint> {
+        let mut end = self.position;
+        for id in self.machine.axis_ids() {
+            if let Some(word) = &words.axes[id] {
+                end.0[id] = self.axis_end(id, word, words.suppress_frames)?;
+            }
+        }
+        Ok(end)
+    }
+
+    fn axis_end(&self, id: AxisId, word: &AxisWord, suppress_frames: bool) -> Outcome<f64> {
+        let axis = self.machine.axis(id);
+        let value_lu = self.modal.position_lu(axis.kind, word.typed);
+        let offset_lu = if suppress_frames { 0.0 } else { self.modal.translation_lu[id] };
+        let now_lu = self.position.0[id];
+        let incremental = match word.form {
+            Form::Modal => !self.modal.absolute,
+            Form::Incremental => true,
+            Form::Absolute => false,
+            Form::Shortest | Form::Positive | Form::Negative => {
+                if !axis.modulo {
+                    return self.direct(word, value_lu + offset_lu, &axis.name);
+                }
+                return Ok(now_lu + way_round(value_lu + offset_lu - now_lu, word.form));
+            }
+        };
+        if !incremental {
+            return Ok(value_lu + offset_lu);
+        }
+        let pending_lu = if suppress_frames { 0.0 } else { offset_lu - self.applied_lu[id] };
+        Ok(now_lu + value_lu + pending_lu)
+    }
+
+    /// DC of an axis with ends is its absolute position; ACP and ACN have no meaning there.
+    fn direct(&self, word: &AxisWord, end_lu: f64, name: &str) -> Outcome<f64> {
+        if word.form == Form::Shortest {
+            return Ok(end_lu);
+        }
+        Err(Fault::new(
+            codes::MODULO,
+            word.columns.clone(),
+            format!("ACP and ACN need an endless axis, and `{name}` is none"),
+        )
+        .label("expected AC or IC"))
+    }
+
+    fn note_applied(&mut self, words: &MotionWords) {
+        let suppressed = words.suppress_frames;
+        for id in self.machine.clone().axis_ids() {
+            let Some(word) = &words.axes[id] else { continue };
+            let incremental = word.form == Form::Incremental || (word.form == Form::Modal && !self.modal.absolute);
+            if !(suppressed && incremental) {
+                self.applied_lu[id] = self.modal.translation_lu[id];
+            }
+        }
+    }
+
+    fn arc(&mut self, words: &MotionWords, end: PartPoint) -> Outcome<ArcGeometry> {
+        let columns = words.columns();
+        let (indices, plane) = self.plane(&columns)?;
+        let start_mm = plane.map(|id| self.position.0[id]);
+        let end_mm = plane.map(|id| end.0[id]);
+        let across = 3 - indices[0] - indices[1];
+        if let Some(word) = &words.centre[across] {
+            if word.typed != 0.0
+                && let Some(entry) = not_acted_on("KIJ")
+            {
+                self.report_word(entry, &word.columns);
+            }
+        }
+        let in_plane = indices.map(|index| words.centre[index].as_ref());
+        let has_centre = in_plane.iter().any(Option::is_some);
+        let shape = match &words.radius {
+            Some((_, radius_columns)) if has_centre => {
+                return Err(Fault::new(codes::BAD_BLOCK, radius_columns.clone(), "centre and radius in one block")
+                    .label("expected one of the two"));
+            }
+            Some((typed, _)) => ArcShape::Radius { radius_mm: self.modal.position_lu(AxisKind::Linear, *typed) },
+            None if has_centre => {
+                let centre = |k: usize| {
+                    in_plane[k]
+                        .map_or(start_mm[k], |word| self.centre(word, plane[k], start_mm[k], words.suppress_frames))
+                };
+                ArcShape::Centre { centre_mm: [centre(0), centre(1)] }
+            }
+            None => {
+                return Err(Fault::new(
+                    codes::ARC_WITHOUT_CENTRE,
+                    columns,
+                    "G2 or G3 without centre and without radius",
+                )
+                .label("expected I, J, K or CR")
+                .help("G2 and G3 are modal: write G1 for a straight line"));
+            }
+        };
+        let counter_clockwise = self.modal.motion == Motion::CounterClockwise;
+        let arc = ProgrammedArc { plane, start_mm, end_mm, shape, counter_clockwise, extra_turns: words.turns };
+        arc_geometry(&arc, &columns)
+    }
+
+    /// I, J, K count from the start of the arc, whatever G90 says; AC() makes them positions.
+    fn centre(&self, word: &AxisWord, axis: AxisId, start_mm: f64, suppress_frames: bool) -> f64 {
+        let typed_mm = self.modal.position_lu(AxisKind::Linear, word.typed);
+        if word.form == Form::Absolute {
+            return typed_mm + if suppress_frames { 0.0 } else { self.modal.translation_lu[axis] };
+        }
+        start_mm + typed_mm
+    }
+
+    /// The axes of the working plane: their places among X, Y, Z, and the axes.
+    fn plane(&self, columns: &Columns) -> Outcome<([usize; 2], [AxisId; 2])> {
+        let (indices, name) = match self.modal.plane {
+            Plane::G17 => ([0, 1], "G17 (X, Y)"),
+            Plane::G18 => ([2, 0], "G18 (Z, X)"),
+            Plane::G19 => ([1, 2], "G19 (Y, Z)"),
+        };
+        match indices.map(|index| self.geometry[index].filter(|id| self.machine.axis(*id).kind == AxisKind::Linear)) {
+            [Some(first), Some(second)] => Ok((indices, [first, second])),
+            _ => Err(Fault::new(
+                codes::ARC_PLANE,
+                columns.clone(),
+                format!("the machine does not have the axes of {name}"),
+            )
+            .label("no circle here")),
+        }
+    }
+
+    /// One warning per axis and run.
+    fn check_travel(&mut self, words: &MotionWords, end: PartPoint) {
+        let machine = self.machine.clone();
+        for id in machine.axis_ids() {
+            let axis = machine.axis(id);
+            let Some(word) = &words.axes[id] else { continue };
+            let Some((limit_lu, beyond_lu)) = outside(axis.travel_lu, end.0[id]) else { continue };
+            if self.travel_warned[id] {
+                continue;
+            }
+            self.travel_warned[id] = true;
+            let (shown, unit): (fn(f64) -> f64, _) = match axis.kind {
+                AxisKind::Linear => (|length_mm| length_mm, "mm"),
+                AxisKind::Rotary => (deg_from_rad, "deg"),
+            };
+            let name = &axis.name;
+            let (end, limit, beyond) = (trimmed(shown(end.0[id])), trimmed(shown(limit_lu)), trimmed(shown(beyond_lu)));
+            let message =
+                format!("{name} goes to {end} {unit}, {beyond} {unit} beyond its travel limit of {limit} {unit}");
+            let fault = Fault::new(codes::TRAVEL, word.columns.clone(), message)
+                .label("outside the travel")
+                .help("the control would raise alarm 10720; the simulation goes on, and further positions of this axis are not reported");
+            self.warn(fault);
+        }
+    }
+}
+
+/// The limit that a position violates, and by how much.
+fn outside(travel_lu: Option<[f64; 2]>, position_lu: f64) -> Option<(f64, f64)> {
+    let [low_lu, high_lu] = travel_lu?;
+    if position_lu < low_lu {
+        return Some((low_lu, low_lu - position_lu));
+    }
+    (position_lu > high_lu).then(|| (high_lu, position_lu - high_lu))
+}
+
+/// Way of an endless axis to a position `difference_rad` away.
+fn way_round(difference_rad: f64, form: Form) -> f64 {
+    let mut forward_rad = difference_rad.rem_euclid(TAU);
+    if forward_rad < SAME_ANGLE_RAD || TAU - forward_rad < SAME_ANGLE_RAD {
+        forward_rad = 0.0;
+    }
+    match form {
+        Form::Negative if forward_rad > 0.0 => forward_rad - TAU,
+        Form::Shortest if forward_rad > PI => forward_rad - TAU,
+        _ => forward_rad,
+    }
+}

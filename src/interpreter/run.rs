@@ -1,0 +1,232 @@
+//! The interpreter itself: takes one line after another, hands out one move after another.
+//!
+//! In: a [`ProgramSource`] and the [`Machine`]. Out: [`Move`]s, warnings, at most one alarm. Words are executed in `block`, motion
+//! in `motion`, jumps and loops in `flow`.
+
+use super::modal::Modal;
+use super::variables::Variables;
+use super::wire::{Event, Feed, Move, MoveKind};
+use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
+use crate::machine::Machine;
+use crate::program::plain::plain_block;
+use crate::program::syntax::{Direction, Statement};
+use crate::program::{
+    Block, BlockRef, Columns, Cursor, Dialect, Fault, NotActedOn, OpenedProgram, Outcome, ProgramId, ProgramSource,
+    codes, parse,
+};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+/// Blocks without a move after which a loop counts as endless: well under two seconds.
+const IDLE_BLOCKS_MAX: u32 = 2_000_000;
+/// Parsed blocks kept for loops.
+const KEPT_BLOCKS_MAX: usize = 4096;
+
+/// A program in execution. A clone goes on independently from the same state.
+#[derive(Clone, Debug)]
+pub struct Interpreter {
+    pub(super) source: ProgramSource,
+    pub(super) program: ProgramId,
+    pub(super) machine: Arc<Machine>,
+    pub(super) dialect: Arc<Dialect>,
+    /// X, Y and Z of the machine: the geometry axes.
+    pub(super) geometry: [Option<AxisId>; 3],
+    /// The line in execution.
+    pub(super) current: Cursor,
+    /// The line after it, or where a jump leads.
+    pub(super) next: Cursor,
+    /// Running number of the block.
+    pub(super) number: u64,
+    pub(super) modal: Modal,
+    /// All axes where the last move ended.
+    pub(super) position: PartPoint,
+    /// Translation that each axis had when it last moved.
+    pub(super) applied_lu: crate::base::AxisVector,
+    pub(super) variables: Variables,
+    /// Moves of the block in execution.
+    pub(super) queue: VecDeque<Move>,
+    /// Block numbers that jumps have found, by line and direction of the jump.
+    pub(super) found_numbers: BTreeMap<(u32, Direction, u64), Cursor>,
+    warnings: Vec<Diagnostic>,
+    warned: BTreeSet<&'static str>,
+    pub(super) travel_warned: PerAxis<bool>,
+    opened: Option<Event>,
+    state: State,
+    idle_blocks: u32,
+    kept_blocks: BTreeMap<u32, Arc<Block>>,
+    furthest_line: u32,
+}
+
+#[derive(Clone, Debug)]
+enum State {
+    Running,
+    /// To be raised after the queue is empty.
+    Alarm(Box<Diagnostic>),
+    Ended,
+}
+
+impl Interpreter {
+    /// At the first line; all axes at home.
+    pub fn new(source: ProgramSource, machine: &Machine) -> Self {
+        let mut position = PartPoint::default();
+        for id in machine.axis_ids() {
+            position.0[id] = machine.axis(id).home_lu;
+        }
+        let opened = OpenedProgram { id: ProgramId(0), name: source.file_name().into(), bytes: source.bytes().clone() };
+        Self {
+            program: ProgramId(0),
+            dialect: Arc::new(Dialect::new(machine)),
+            geometry: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)),
+            current: source.first(),
+            next: source.first(),
+            number: 0,
+            modal: Modal::new(&machine.feed),
+            position,
+            applied_lu: crate::base::AxisVector::zero(),
+            variables: Variables::default(),
+            queue: VecDeque::new(),
+            found_numbers: BTreeMap::new(),
+            warnings: Vec::new(),
+            warned: BTreeSet::new(),
+            travel_warned: PerAxis::splat(false),
+            opened: Some(Event::ProgramOpened(opened)),
+            state: State::Running,
+            idle_blocks: 0,
+            kept_blocks: BTreeMap::new(),
+            furthest_line: 0,
+            machine: Arc::new(machine.clone()),
+            source,
+        }
+    }
+
+    /// The next move; `Ok(None)` after the end of the program. The alarm of a block comes when the block is reached, after all
+    /// moves before it; after an alarm there is nothing more.
+    pub fn next_move(&mut self) -> Result<Option<Move>, Box<Diagnostic>> {
+        loop {
+            if let Some(next) = self.queue.pop_front() {
+                self.idle_blocks = 0;
+                return Ok(Some(next));
+            }
+            match std::mem::replace(&mut self.state, State::Ended) {
+                State::Running => {}
+                State::Alarm(alarm) => return Err(alarm),
+                State::Ended => return Ok(None),
+            }
+            self.state = State::Running;
+            if let Err(fault) = self.step() {
+                self.state = State::Alarm(Box::new(self.diagnostic(*fault)));
+            }
+            if !matches!(self.state, State::Running) && self.queue.is_empty() && self.opened.is_some() {
+                // The program is on record even if it does nothing.
+                self.emit_function(Vec::new(), false);
+            }
+        }
+    }
+
+    /// Warnings since the last call; each word once a run.
+    pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Blocks executed so far; comments and empty lines do not count.
+    pub fn blocks(&self) -> u64 {
+        self.number
+    }
+
+    /// Line in execution.
+    pub fn line(&self) -> u32 {
+        self.current.line
+    }
+
+    /// Executes one line.
+    fn step(&mut self) -> Outcome<()> {
+        let source = self.source.clone();
+        let Some((bytes, following)) = source.line_bytes(self.next) else {
+            self.end();
+            return Ok(());
+        };
+        self.current = self.next;
+        self.next = following;
+        self.idle_blocks += 1;
+        if self.idle_blocks > IDLE_BLOCKS_MAX {
+            return Err(self.endless());
+        }
+        if let Some(plain) = plain_block(bytes, &self.dialect)
+            && self.plain_move(&plain)
+        {
+            return Ok(());
+        }
+        let block = self.parsed(bytes)?;
+        if block.statement != Statement::Words(Vec::new()) {
+            self.number += 1;
+        }
+        self.execute(&block.statement)
+    }
+
+    /// Parses the line in execution; what a loop passes again is kept.
+    fn parsed(&mut self, bytes: &[u8]) -> Outcome<Arc<Block>> {
+        let line = self.current.line;
+        if let Some(kept) = self.kept_blocks.get(&line) {
+            return Ok(kept.clone());
+        }
+        let block = Arc::new(parse(&self.source.decode(bytes), &self.dialect)?);
+        if line <= self.furthest_line && self.kept_blocks.len() < KEPT_BLOCKS_MAX {
+            self.kept_blocks.insert(line, block.clone());
+        }
+        self.furthest_line = self.furthest_line.max(line);
+        Ok(block)
+    }
+
+    /// M2, M30, M17, RET or the end of the text.
+    pub(super) fn end(&mut self) {
+        self.state = State::Ended;
+    }
+
+    /// Hands a move over.
+    pub(super) fn emit(&mut self, kind: MoveKind, feed: Feed, exact_stop: bool, mut events: Vec<Event>) {
+        if let Some(opened) = self.opened.take() {
+            events.insert(0, opened);
+        }
+        let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
+        let modes = self.modal.modes(exact_stop);
+        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, events });
+    }
+
+    /// Hands a move without motion over.
+    pub(super) fn emit_function(&mut self, events: Vec<Event>, stops: bool) {
+        self.emit(MoveKind::Function { stops }, self.standing_feed(), false, events);
+    }
+
+    /// Reports a word that is not acted on, once a run.
+    pub(super) fn report_word(&mut self, entry: &'static NotActedOn, columns: &Columns) {
+        if self.warned.insert(entry.word) {
+            let fault = Fault::new(
+                codes::NOT_ACTED_ON,
+                columns.clone(),
+                format!("`{}` is not acted on: {}", entry.word, entry.consequence),
+            )
+            .label("known, but not acted on");
+            self.warn(fault);
+        }
+    }
+
+    /// Puts a finding on the list of warnings.
+    pub(super) fn warn(&mut self, fault: Box<Fault>) {
+        let mut diagnostic = self.diagnostic(*fault);
+        diagnostic.severity = crate::base::Severity::Warning;
+        self.warnings.push(diagnostic);
+    }
+
+    fn diagnostic(&self, fault: Fault) -> Diagnostic {
+        let text = self.source.line_text(self.current).into_owned();
+        fault.at(self.source.shared_name(), self.current.line, text)
+    }
+
+    fn endless(&self) -> Box<Fault> {
+        let end = self.source.line_text(self.current).trim_end().len() as u32;
+        let message = format!("{IDLE_BLOCKS_MAX} blocks were executed without a motion: this loop does not end");
+        Fault::new(codes::ENDLESS, 0..end, message)
+            .label("executed again and again")
+            .help("check the condition of the loop or jump")
+    }
+}

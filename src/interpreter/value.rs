@@ -1,0 +1,89 @@
+//! Values of expressions and what they are converted to.
+//!
+//! In: values. Out: [`Value`], conversions with a finding where there is none. REAL to INT rounds half away from zero (the
+//! control's rule for assignments: a fraction of 0.5 or more is rounded up). Comparison of REAL is relative (1e-12).
+
+use crate::program::{Columns, Fault, Outcome, codes};
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+/// Relative difference up to which two REAL values are equal on the control (programming manual, comparison operators).
+const EQUAL_RATIO: f64 = 1e-12;
+
+/// A value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// BOOL.
+    Bool(bool),
+    /// INT (and CHAR).
+    Int(i32),
+    /// REAL.
+    Real(f64),
+    /// STRING.
+    Text(Arc<str>),
+}
+
+impl Value {
+    /// As a number; texts have none.
+    pub fn number(&self, columns: &Columns) -> Outcome<f64> {
+        match self {
+            Self::Bool(value) => Ok(f64::from(u8::from(*value))),
+            Self::Int(value) => Ok(f64::from(*value)),
+            Self::Real(value) => Ok(*value),
+            Self::Text(_) => {
+                Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a text stands where a number is needed")
+                    .label("expected a number"))
+            }
+        }
+    }
+
+    /// As an integer of 32 bits, rounded.
+    pub fn integer(&self, columns: &Columns) -> Outcome<i32> {
+        let value = self.number(columns)?;
+        let rounded = value.round();
+        if (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&rounded) {
+            return Ok(rounded as i32);
+        }
+        Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{value} does not fit an INT"))
+            .label("expected -2147483648 to 2147483647"))
+    }
+
+    /// True unless zero.
+    pub fn truth(&self, columns: &Columns) -> Outcome<bool> {
+        Ok(self.number(columns)? != 0.0)
+    }
+
+    /// As text, for `<<` and MSG.
+    pub fn text(&self) -> Arc<str> {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Bool(value) => Arc::from(if *value { "1" } else { "0" }),
+            Self::Int(value) => value.to_string().into(),
+            Self::Real(value) => trimmed(*value).into(),
+        }
+    }
+
+    /// Order of two values; texts compare with texts only.
+    pub fn compare(&self, other: &Self, columns: &Columns) -> Outcome<Ordering> {
+        match (self, other) {
+            (Self::Text(a), Self::Text(b)) => Ok(a.cmp(b)),
+            (Self::Int(a), Self::Int(b)) => Ok(a.cmp(b)),
+            _ => {
+                let (a, b) = (self.number(columns)?, other.number(columns)?);
+                if (a - b).abs() <= EQUAL_RATIO * a.abs().max(b.abs()) {
+                    return Ok(Ordering::Equal);
+                }
+                Ok(a.partial_cmp(&b).unwrap_or(Ordering::Equal))
+            }
+        }
+    }
+}
+
+/// A number with at most six decimals and no trailing zeros: "12.5", "-0.003", "0".
+pub fn trimmed(value: f64) -> String {
+    let mut text = format!("{value:.6}");
+    if text.contains('.') {
+        text.truncate(text.trim_end_matches('0').trim_end_matches('.').len());
+    }
+    if text == "-0" { "0".to_owned() } else { text }
+}

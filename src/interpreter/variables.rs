@@ -1,0 +1,220 @@
+//! Variables of a run: R parameters and what DEF made.
+//!
+//! In: definitions, assignments. Out: values. Memory is bounded. Undeclared names are findings with the nearest declared one.
+
+use super::value::Value;
+use crate::base::diagnostics::nearest;
+use crate::program::syntax::VariableType;
+use crate::program::{Columns, Fault, Outcome, codes};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Highest R parameter (MD28050 allows 32535 of them).
+pub const R_MAX: i32 = 32534;
+/// Elements of all variables together.
+const ELEMENTS_MAX: usize = 1_000_000;
+
+/// All variables.
+#[derive(Clone, Debug, Default)]
+pub struct Variables {
+    parameters: Vec<f64>,
+    declared: BTreeMap<Arc<str>, Variable>,
+    elements: usize,
+}
+
+#[derive(Clone, Debug)]
+struct Variable {
+    variable_type: VariableType,
+    /// Line of its DEF: a loop may pass it again.
+    line: u32,
+    dimensions: Vec<usize>,
+    /// Row by row.
+    values: Vec<Value>,
+}
+
+impl Variables {
+    /// R parameter; 0 before the first assignment.
+    pub fn parameter(&self, number: i32, columns: &Columns) -> Outcome<f64> {
+        Ok(self.parameters.get(parameter_index(number, columns)?).copied().unwrap_or(0.0))
+    }
+
+    /// Sets an R parameter.
+    pub fn set_parameter(&mut self, number: i32, value: f64, columns: &Columns) -> Outcome<()> {
+        let index = parameter_index(number, columns)?;
+        if self.parameters.len() <= index {
+            self.parameters.resize(index + 1, 0.0);
+        }
+        self.parameters[index] = value;
+        Ok(())
+    }
+
+    /// True if the name stands for a STRING without indices: a computed jump target.
+    pub fn text(&self, name: &str) -> Option<Arc<str>> {
+        match self.declared.get(name)?.values.as_slice() {
+            [Value::Text(text)] => Some(text.clone()),
+            _ => None,
+        }
+    }
+
+    /// DEF: a new variable of zeros, or the same one again.
+    pub fn define(
+        &mut self,
+        name: &Arc<str>,
+        variable_type: VariableType,
+        dimensions: &[i32],
+        at: (u32, &Columns),
+    ) -> Outcome<()> {
+        let (line, columns) = at;
+        if let Some(known) = self.declared.get(name)
+            && known.line != line
+        {
+            return Err(Fault::new(
+                codes::REDECLARED,
+                columns.clone(),
+                format!("`{name}` is already defined in line {}", known.line),
+            )
+            .label("defined again"));
+        }
+        let mut count = 1_usize;
+        let mut sizes = Vec::new();
+        for size in dimensions {
+            let size = usize::try_from(*size).ok().filter(|size| *size > 0).ok_or_else(|| {
+                Fault::new(codes::BAD_INDEX, columns.clone(), format!("an array of {size} elements is not possible"))
+                    .label("expected a size from 1")
+            })?;
+            count = count.saturating_mul(size);
+            sizes.push(size);
+        }
+        let replaced = self.declared.get(name).map_or(0, |known| known.values.len());
+        let elements = (self.elements - replaced).saturating_add(count);
+        if elements > ELEMENTS_MAX {
+            return Err(Fault::new(
+                codes::TOO_MUCH_MEMORY,
+                columns.clone(),
+                format!("all variables together would have {elements} elements"),
+            )
+            .label(format!("at most {ELEMENTS_MAX}")));
+        }
+        self.elements = elements;
+        let zero = match variable_type {
+            VariableType::Bool => Value::Bool(false),
+            VariableType::Char | VariableType::Int => Value::Int(0),
+            VariableType::Real => Value::Real(0.0),
+            VariableType::Text(_) => Value::Text(Arc::from("")),
+        };
+        self.declared
+            .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
+        Ok(())
+    }
+
+    /// Value of a variable or array element.
+    pub fn get(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<Value> {
+        let variable = self.declared(name, columns)?;
+        let place = variable.place(name, indices, columns)?;
+        Ok(variable.values[place].clone())
+    }
+
+    /// Sets a variable or array element, converted to its type.
+    pub fn set(&mut self, name: &str, indices: &[i32], value: &Value, columns: (&Columns, &Columns)) -> Outcome<()> {
+        let (name_columns, value_columns) = columns;
+        let variable = self.declared(name, name_columns)?;
+        let place = variable.place(name, indices, name_columns)?;
+        let converted = convert(variable.variable_type, value, value_columns)?;
+        if let Some(variable) = self.declared.get_mut(name) {
+            variable.values[place] = converted;
+        }
+        Ok(())
+    }
+
+    /// Number of elements from the one with these indices to the end: what SET and REP may fill.
+    pub fn fill_range(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<std::ops::Range<usize>> {
+        let variable = self.declared(name, columns)?;
+        let start = if indices.is_empty() { 0 } else { variable.place(name, indices, columns)? };
+        Ok(start..variable.values.len())
+    }
+
+    /// Sets the element at a place given by [`Self::fill_range`].
+    pub fn set_place(&mut self, name: &str, place: usize, value: &Value, columns: &Columns) -> Outcome<()> {
+        if let Some(variable) = self.declared.get_mut(name)
+            && let Some(element) = variable.values.get_mut(place)
+        {
+            *element = convert(variable.variable_type, value, columns)?;
+        }
+        Ok(())
+    }
+
+    fn declared(&self, name: &str, columns: &Columns) -> Outcome<&Variable> {
+        self.declared.get(name).ok_or_else(|| {
+            let near = nearest(name, self.declared.keys().map(|known| &**known));
+            undeclared(name, near, columns)
+        })
+    }
+}
+
+/// The finding for a name without DEF.
+pub fn undeclared(name: &str, near: Option<&str>, columns: &Columns) -> Box<Fault> {
+    Fault::new(codes::UNDECLARED, columns.clone(), format!("the variable `{name}` has no DEF"))
+        .label("not defined")
+        .help(near.map_or_else(
+            || format!("write `DEF REAL {name}` at the start of the program"),
+            |near| format!("did you mean `{near}`?"),
+        ))
+}
+
+impl Variable {
+    fn place(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<usize> {
+        if indices.len() != self.dimensions.len() {
+            let message = format!("`{name}` has {} dimensions", self.dimensions.len());
+            return Err(
+                Fault::new(codes::BAD_INDEX, columns.clone(), message).label(format!("{} given here", indices.len()))
+            );
+        }
+        let mut place = 0;
+        for (index, size) in indices.iter().zip(&self.dimensions) {
+            let Some(index) = usize::try_from(*index).ok().filter(|index| index < size) else {
+                let message = format!("index {index} is outside `{name}`");
+                return Err(
+                    Fault::new(codes::BAD_INDEX, columns.clone(), message).label(format!("expected 0 to {}", size - 1))
+                );
+            };
+            place = place * size + index;
+        }
+        Ok(place)
+    }
+}
+
+fn parameter_index(number: i32, columns: &Columns) -> Outcome<usize> {
+    usize::try_from(number).ok().filter(|_| number <= R_MAX).ok_or_else(|| {
+        Fault::new(codes::BAD_INDEX, columns.clone(), format!("there is no R parameter {number}"))
+            .label(format!("expected 0 to {R_MAX}"))
+    })
+}
+
+fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Outcome<Value> {
+    Ok(match (variable_type, value) {
+        (VariableType::Text(length), Value::Text(text)) if text.chars().count() <= usize::from(length) => value.clone(),
+        (VariableType::Text(length), Value::Text(text)) => {
+            let message = format!("this text has {} characters", text.chars().count());
+            return Err(Fault::new(codes::TEXT_TOO_LONG, columns.clone(), message)
+                .label(format!("the variable holds {length}")));
+        }
+        (VariableType::Text(_), _) => {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a number cannot be stored in a STRING")
+                .label("expected a text")
+                .help("join it to a text: \"\"<<value"));
+        }
+        (VariableType::Char, Value::Text(text)) if text.chars().count() == 1 => {
+            Value::Int(text.chars().next().map_or(0, |c| c as i32))
+        }
+        (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
+        (VariableType::Real, value) => Value::Real(value.number(columns)?),
+        (VariableType::Int, value) => Value::Int(value.integer(columns)?),
+        (VariableType::Char, value) => match value.integer(columns)? {
+            code @ 0..=255 => Value::Int(code),
+            code => {
+                return Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{code} is not a CHAR"))
+                    .label("expected 0 to 255"));
+            }
+        },
+    })
+}

@@ -1,0 +1,486 @@
+//! One line -> one [`Block`].
+//!
+//! In: a decoded line and the axis names. Out: the block, or the first finding in it: the next line is read afresh, so that one
+//! typo is one error. This file reads the frame of a block (skip level, number, label) and its words; statements that fill a block
+//! are read in `statements`. Does not execute.
+
+use super::codes::{self, Columns, Fault, Outcome};
+use super::dialect::Dialect;
+use super::expression::{arguments, expected, expression, indices, not_built, unused_expression};
+use super::lexer::{Lexer, Number, Token};
+use super::statements::statement;
+use super::syntax::{
+    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, Initial, Statement, Target, Word, WordKind,
+};
+use super::words::{self, Control, Keyword, NotActedOn, Role};
+
+/// Highest number of a tool, an edge or an M function.
+const INTEGER_MAX: f64 = 2_147_483_647.0;
+
+/// Parses a line.
+pub fn parse(text: &str, dialect: &Dialect) -> Outcome<Block> {
+    let mut lexer = Lexer::new(text);
+    let empty = Statement::Words(Vec::new());
+    let mut block = Block { skip: None, number: None, label: None, statement: empty };
+    if lexer.peek_byte() == Some(b'%') {
+        // Header of a transmission or archive: `%_N_NAME_MPF`.
+        return Ok(block);
+    }
+    block.skip = skip_level(&mut lexer);
+    block.number = block_number(&mut lexer)?;
+    if block.skip.is_none() {
+        block.skip = skip_level(&mut lexer);
+    }
+    block.label = label(&mut lexer);
+    let start = lexer.position();
+    let before = lexer;
+    if let Some(name) = lexer.name() {
+        let columns = lexer.columns_from(start);
+        match words::role(name) {
+            Some(Role::Control(Control::Declaration)) => return Ok(block),
+            Some(Role::Control(control)) => {
+                block.statement = statement(control, &mut lexer, columns)?;
+                return end_of_block(lexer, block);
+            }
+            Some(Role::NotActedOn(entry)) if SYNCHRONISED.contains(&entry.word) => {
+                block.statement = Statement::NotActedOn(entry, columns);
+                return Ok(block);
+            }
+            _ => {}
+        }
+    }
+    lexer = before;
+    block.statement = Statement::Words(block_words(&mut lexer, dialect)?);
+    Ok(block)
+}
+
+/// Words that open a synchronised action: the rest of the line belongs to it.
+const SYNCHRONISED: [&str; 7] = ["ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO"];
+
+fn end_of_block(mut lexer: Lexer, block: Block) -> Outcome<Block> {
+    if lexer.at_end() {
+        return Ok(block);
+    }
+    let columns = lexer.columns_of_next();
+    lexer.token()?;
+    Err(Fault::new(codes::TRAILING_TEXT, columns, "the statement ends before this")
+        .label("expected the end of the block")
+        .help("write it into a block of its own"))
+}
+
+/// `/` or `/0` to `/9`.
+fn skip_level(lexer: &mut Lexer) -> Option<u8> {
+    if lexer.peek_byte() != Some(b'/') {
+        return None;
+    }
+    lexer.skip_byte();
+    Some(lexer.digits().map_or(0, |level| level.min(9) as u8))
+}
+
+/// `N10` or `:10`.
+fn block_number(lexer: &mut Lexer) -> Outcome<Option<BlockNumber>> {
+    let before = *lexer;
+    let main = match lexer.peek_byte() {
+        Some(b':') => true,
+        Some(b'N' | b'n') => false,
+        _ => return Ok(None),
+    };
+    let start = lexer.position();
+    lexer.skip_byte();
+    if !main && !lexer.next_is_digit() {
+        // A word that begins with N, such as NORM.
+        *lexer = before;
+        return Ok(None);
+    }
+    lexer.position();
+    match lexer.digits() {
+        Some(number) => Ok(Some(BlockNumber { number, main })),
+        None => Err(Fault::new(codes::BAD_NUMBER, lexer.columns_from(start), "this block number cannot be read")
+            .label("expected digits")),
+    }
+}
+
+/// `NAME:`.
+fn label(lexer: &mut Lexer) -> Option<std::sync::Arc<str>> {
+    let before = *lexer;
+    let name = lexer.name();
+    if let Some(name) = name
+        && name.len() > 1
+        && lexer.peek_byte() == Some(b':')
+    {
+        lexer.skip_byte();
+        return Some(name.to_ascii_uppercase().into());
+    }
+    *lexer = before;
+    None
+}
+
+fn block_words(lexer: &mut Lexer, dialect: &Dialect) -> Outcome<Vec<Word>> {
+    let mut found = Vec::new();
+    while !lexer.at_end() {
+        let start = lexer.position();
+        let kind = WordParser { lexer, dialect, start, first: found.is_empty() }.word()?;
+        found.push(Word { columns: lexer.columns_from(start), kind });
+    }
+    Ok(found)
+}
+
+/// Reads one word.
+struct WordParser<'l, 'a, 'd> {
+    lexer: &'l mut Lexer<'a>,
+    dialect: &'d Dialect,
+    start: usize,
+    first: bool,
+}
+
+impl<'a> WordParser<'_, 'a, '_> {
+    fn word(&mut self) -> Outcome<WordKind> {
+        let Some(name) = self.lexer.name() else {
+            let mut ahead = *self.lexer;
+            ahead.token()?;
+            return Err(expected(self.lexer, "a word such as G1 or X10"));
+        };
+        match name.as_bytes() {
+            [b'$', ..] => self.system_variable(name),
+            [letter] => self.letter(*letter),
+            [letter, second, ..] if second.is_ascii_digit() && letter.is_ascii_alphabetic() => {
+                self.letter_with_digits(name)
+            }
+            _ => self.named(name),
+        }
+    }
+
+    fn columns(&self) -> Columns {
+        self.lexer.columns_from(self.start)
+    }
+
+    /// `X-10`, `X 10`, `X=...`, `R[...]=`: one letter, and no digit right behind it.
+    fn letter(&mut self, letter: u8) -> Outcome<WordKind> {
+        let name = char::from(letter).to_ascii_uppercase();
+        if name == 'R' && self.lexer.take("[") {
+            let index = expression(self.lexer)?;
+            if !self.lexer.take("]") {
+                return Err(expected(self.lexer, "an operator or `]`"));
+            }
+            return self.assignment(Target::Parameter(index));
+        }
+        if self.lexer.take("[") {
+            let columns = self.columns();
+            return Err(not_built(&format!("{name}[...]"), "indexed addresses are not built yet", columns));
+        }
+        let value = if self.lexer.take("=") { self.address_value()? } else { self.plain_number(letter)? };
+        self.address(letter, value)
+    }
+
+    /// `X10`, `G1X10`, `M1=3`, `R5=...`: one letter, and digits right behind it.
+    fn letter_with_digits(&mut self, name: &'a str) -> Outcome<WordKind> {
+        let letter = name.as_bytes()[0];
+        let all_digits = name[1..].bytes().all(|byte| byte.is_ascii_digit());
+        if all_digits && self.lexer.peek() == Token::Symbol("=") {
+            return self.extended(name);
+        }
+        self.lexer.rewind(self.start + 1);
+        if letter.eq_ignore_ascii_case(&b'R') {
+            self.lexer.number()?;
+            return Err(Fault::new(
+                codes::EXPECTED_VALUE,
+                self.columns(),
+                format!("the R parameter `{name}` gets no value"),
+            )
+            .label("expected `=` and a value"));
+        }
+        let value = self.plain_number(letter)?;
+        self.address(letter, value)
+    }
+
+    /// `X1=`, `S2=`, `R5=`: letter and number, then an equals sign.
+    fn extended(&mut self, name: &str) -> Outcome<WordKind> {
+        let letter = name.as_bytes()[0].to_ascii_uppercase();
+        let name_columns = self.columns();
+        let number: Option<u32> = name[1..].parse().ok();
+        if letter == b'R' {
+            let index = number.and_then(|number| i32::try_from(number).ok()).unwrap_or(i32::MAX);
+            return self.assignment(Target::Parameter(Expr { columns: name_columns, kind: ExprKind::Int(index) }));
+        }
+        self.lexer.take("=");
+        if let Some(axis) = self.dialect.axis(name) {
+            return Ok(WordKind::Address(Address::Axis(axis), self.address_value()?));
+        }
+        match (letter, words::role(name)) {
+            (_, Some(Role::NotBuilt(reason))) => Err(not_built(name, reason, name_columns)),
+            (b'S' | b'M' | b'T' | b'D' | b'H', _) => {
+                let value = self.address_value()?;
+                match (letter, number) {
+                    (_, Some(1)) => self.address(letter, value),
+                    (b'M', _) => not_acted_on("Mn="),
+                    (b'H', _) => not_acted_on("H"),
+                    _ => not_acted_on("Sn="),
+                }
+            }
+            _ => Err(self.unknown_axis(name, name_columns)),
+        }
+    }
+
+    /// The number behind a letter without an equals sign.
+    fn plain_number(&mut self, letter: u8) -> Outcome<AddressValue> {
+        let start = self.lexer.position();
+        let negative = self.lexer.take("-");
+        if !negative {
+            self.lexer.take("+");
+        }
+        if !matches!(self.lexer.peek(), Token::Number(_)) || self.lexer.peek_byte() == Some(b'\'') {
+            let mut help = None;
+            if matches!(self.lexer.peek(), Token::Name(_) | Token::Symbol("(")) {
+                help = Some(format!("a value that is not a plain number needs `=`: {}=...", char::from(letter)));
+            }
+            let fault = expected(self.lexer, &format!("a number after `{}`", char::from(letter)));
+            return Err(Box::new(Fault { code: codes::EXPECTED_VALUE, ..*fault }).maybe_help(help));
+        }
+        let sign = if negative { -1.0 } else { 1.0 };
+        let kind = match self.lexer.number()? {
+            Number::Int(value) if negative => ExprKind::Int(-value),
+            Number::Int(value) => ExprKind::Int(value),
+            // A negative zero becomes zero.
+            Number::Real(value) => ExprKind::Real(sign * value + 0.0),
+        };
+        Ok(AddressValue { form: Form::Modal, value: Expr { columns: self.lexer.columns_from(start), kind } })
+    }
+
+    /// What follows an equals sign: an expression, or AC(...) and its kin.
+    fn address_value(&mut self) -> Outcome<AddressValue> {
+        let mut ahead = *self.lexer;
+        let form = match ahead.name().map(str::to_ascii_uppercase).as_deref() {
+            Some("AC") => Form::Absolute,
+            Some("IC") => Form::Incremental,
+            Some("DC") => Form::Shortest,
+            Some("ACP") => Form::Positive,
+            Some("ACN") => Form::Negative,
+            Some("QU") => Form::Modal,
+            _ => return Ok(AddressValue { form: Form::Modal, value: expression(self.lexer)? }),
+        };
+        *self.lexer = ahead;
+        if !self.lexer.take("(") {
+            return Err(expected(self.lexer, "`(`"));
+        }
+        let value = expression(self.lexer)?;
+        if self.lexer.take(")") {
+            return Ok(AddressValue { form, value });
+        }
+        Err(expected(self.lexer, "an operator or `)`"))
+    }
+
+    /// A one-letter address with its value.
+    fn address(&self, letter: u8, value: AddressValue) -> Outcome<WordKind> {
+        let letter = letter.to_ascii_uppercase();
+        if let Some(axis) = self.dialect.letter(letter) {
+            return Ok(WordKind::Address(Address::Axis(axis), value));
+        }
+        let address = match letter {
+            b'G' => return self.g_function(&value),
+            b'F' => Address::Feed,
+            b'S' => Address::SpindleSpeed,
+            b'T' => Address::Tool,
+            b'D' => Address::Edge,
+            b'M' => Address::M,
+            b'I' => Address::Centre(0),
+            b'J' => Address::Centre(1),
+            b'K' => Address::Centre(2),
+            b'H' => return not_acted_on("H"),
+            b'L' | b'P' => {
+                return Err(Fault::new(
+                    codes::NO_SUBPROGRAMS,
+                    self.columns(),
+                    "calls of sub-programs are not built yet",
+                )
+                .label("a sub-program call"));
+            }
+            b'N' => {
+                return Err(Fault::new(
+                    codes::BAD_BLOCK,
+                    self.columns(),
+                    "the block number stands at the start of the block",
+                )
+                .label("not here"));
+            }
+            _ => return Err(self.unknown_axis(&char::from(letter).to_string(), self.columns())),
+        };
+        Ok(WordKind::Address(address, value))
+    }
+
+    fn unknown_axis(&self, name: &str, columns: Columns) -> Box<Fault> {
+        Fault::new(codes::UNKNOWN_AXIS, columns, format!("the machine has no axis `{name}`"))
+            .label("unknown axis")
+            .help(format!("the axes of this machine are {}", self.dialect.axis_list()))
+    }
+
+    fn g_function(&self, value: &AddressValue) -> Outcome<WordKind> {
+        let columns = self.columns();
+        let ExprKind::Int(number) = value.value.kind else {
+            return Err(Fault::new(codes::UNKNOWN_G, columns, "a G function is a whole number")
+                .label("expected a form such as G1"));
+        };
+        let number = u32::try_from(number).unwrap_or(u32::MAX);
+        match words::g_function(number) {
+            Ok(function) => Ok(WordKind::G(function)),
+            Err("") => {
+                Err(Fault::new(codes::UNKNOWN_G, columns, format!("there is no G function G{number}")).label("unknown"))
+            }
+            Err(reason) => Err(not_built(&format!("G{number}"), reason, columns)),
+        }
+    }
+
+    fn assignment(&mut self, target: Target) -> Outcome<WordKind> {
+        if !self.lexer.take("=") {
+            return Err(expected(self.lexer, "`=`"));
+        }
+        match initial(self.lexer)? {
+            Initial::One(value) => Ok(WordKind::Assign(target, value)),
+            filling => Ok(WordKind::Fill(target, filling)),
+        }
+    }
+
+    fn system_variable(&mut self, name: &str) -> Outcome<WordKind> {
+        let columns = self.columns();
+        let upper = name.to_ascii_uppercase();
+        if let Some(digits) = upper.strip_prefix("$R") {
+            if digits.is_empty() && self.lexer.take("[") {
+                let index = expression(self.lexer)?;
+                if !self.lexer.take("]") {
+                    return Err(expected(self.lexer, "an operator or `]`"));
+                }
+                return self.assignment(Target::Parameter(index));
+            }
+            if let Ok(number) = digits.parse() {
+                return self.assignment(Target::Parameter(Expr { columns, kind: ExprKind::Int(number) }));
+            }
+        }
+        let known = if upper.starts_with("$TC_") { "$TC_" } else { upper.as_str() };
+        match words::role(known) {
+            Some(Role::NotActedOn(entry)) => self.pass_over(entry),
+            _ => Err(not_built(name, "this system variable cannot be written yet", columns)),
+        }
+    }
+
+    /// A word of two letters or more.
+    fn named(&mut self, name: &str) -> Outcome<WordKind> {
+        let columns = self.columns();
+        let next = self.lexer.peek();
+        if let Some(axis) = self.dialect.axis(name) {
+            if !self.lexer.take("=") {
+                return Err(expected(self.lexer, &format!("`=` after the axis `{name}`")));
+            }
+            return Ok(WordKind::Address(Address::Axis(axis), self.address_value()?));
+        }
+        match words::role(name) {
+            Some(Role::Keyword(Keyword::ClearFrame)) if !self.lexer.at_end() => Err(not_built(
+                name,
+                "rotated, scaled and mirrored frames are not built yet: only TRANS and ATRANS",
+                columns,
+            )),
+            Some(Role::Keyword(keyword)) => Ok(WordKind::Keyword(keyword)),
+            Some(Role::Address(address)) => {
+                if !self.lexer.take("=") {
+                    return Err(expected(self.lexer, &format!("`=` after {name}")));
+                }
+                Ok(WordKind::Address(address, self.address_value()?))
+            }
+            Some(Role::Message) => self.message(),
+            Some(Role::Silent) => {
+                self.pass_over_value()?;
+                Ok(WordKind::Silent)
+            }
+            Some(Role::NotActedOn(entry)) => self.pass_over(entry),
+            Some(Role::NotBuilt(reason)) => Err(not_built(name, reason, columns)),
+            Some(Role::Control(_)) => {
+                Err(Fault::new(codes::BAD_BLOCK, columns, format!("`{name}` must be the first word of its block"))
+                    .label("not here")
+                    .help("write it into a block of its own"))
+            }
+            Some(Role::Function(_) | Role::Syntax) => {
+                Err(Fault::new(codes::BAD_BLOCK, columns, format!("`{name}` cannot begin a word"))
+                    .label("expected an address or a word"))
+            }
+            None if matches!(next, Token::Symbol("=" | "[")) => {
+                let indices = indices(self.lexer)?;
+                self.assignment(Target::Variable { name: name.to_ascii_uppercase().into(), indices })
+            }
+            None => Err(self.unknown_word(name, columns)),
+        }
+    }
+
+    fn message(&mut self) -> Outcome<WordKind> {
+        if !self.lexer.take("(") {
+            return Err(expected(self.lexer, "`(` after MSG"));
+        }
+        let mut given = arguments(self.lexer, ")", false)?.into_iter();
+        Ok(WordKind::Message(given.next().flatten()))
+    }
+
+    fn pass_over(&mut self, entry: &'static NotActedOn) -> Outcome<WordKind> {
+        self.pass_over_value()?;
+        Ok(WordKind::NotActedOn(entry))
+    }
+
+    /// Index, arguments and value of a word that is not acted on.
+    fn pass_over_value(&mut self) -> Outcome<()> {
+        if self.lexer.take("[") {
+            arguments(self.lexer, "]", true)?;
+        }
+        if self.lexer.take("(") {
+            arguments(self.lexer, ")", true)?;
+        } else if self.lexer.take("=") {
+            unused_expression(self.lexer)?;
+        }
+        Ok(())
+    }
+
+    fn unknown_word(&mut self, name: &str, columns: Columns) -> Box<Fault> {
+        let help = words::did_you_mean(name);
+        let is_call = self.first && (self.lexer.peek() == Token::Symbol("(") || self.lexer.at_end());
+        if is_call && help.is_none() {
+            return Fault::new(
+                codes::NO_SUBPROGRAMS,
+                columns,
+                format!("`{name}` looks like a sub-program: their calls are not built yet"),
+            )
+            .label("not a word of the language");
+        }
+        Fault::new(codes::UNKNOWN_WORD, columns, format!("unknown word `{name}`"))
+            .label("not a word of the language")
+            .maybe_help(help.or_else(|| (!is_call).then(|| format!("an assignment needs `=`: {name}=..."))))
+    }
+}
+
+/// A value, SET(...) or REP(...).
+pub(super) fn initial(lexer: &mut Lexer) -> Outcome<Initial> {
+    let mut ahead = *lexer;
+    let name = ahead.name().unwrap_or_default();
+    let (is_set, is_rep) = (name.eq_ignore_ascii_case("SET"), name.eq_ignore_ascii_case("REP"));
+    if !(is_set || is_rep) || !ahead.take("(") {
+        return Ok(Initial::One(expression(lexer)?));
+    }
+    let start = lexer.position();
+    *lexer = ahead;
+    let mut values = arguments(lexer, ")", false)?;
+    if is_set {
+        return Ok(Initial::Set(values));
+    }
+    let count = if values.len() == 2 { values.pop().flatten() } else { None };
+    match (values.pop().flatten(), values.is_empty()) {
+        (Some(value), true) => Ok(Initial::Repeat(value, count)),
+        _ => Err(Fault::new(codes::EXPECTED_VALUE, lexer.columns_from(start), "REP takes a value and how often")
+            .label("expected REP(value, count)")),
+    }
+}
+
+fn not_acted_on(word: &str) -> Outcome<WordKind> {
+    match words::role(word) {
+        Some(Role::NotActedOn(entry)) => Ok(WordKind::NotActedOn(entry)),
+        _ => Ok(WordKind::Silent),
+    }
+}
+
+/// The whole number of an address such as M or T, if the value is one and not negative.
+pub fn whole_number(value: f64) -> Option<u32> {
+    (value >= 0.0 && value <= INTEGER_MAX && value.fract() == 0.0).then_some(value as u32)
+}

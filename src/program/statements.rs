@@ -1,0 +1,235 @@
+//! Statements that fill a block: DEF, IF, FOR, WHILE, LOOP, REPEAT, CASE and jumps.
+//!
+//! In: a [`Lexer`] behind the first word. Out: [`Statement`]. What stands behind the statement is the caller's business.
+//! Partners (IF and its ENDIF) are found by `structure`, not here.
+
+use super::codes::{self, Columns, Fault, Outcome};
+use super::expression::{expected, expression, indices, not_built};
+use super::lexer::{Lexer, Number, Token};
+use super::parser::initial;
+use super::syntax::{
+    Case, DefinedVariable, Definition, Destination, Direction, Expr, ExprKind, ForLoop, Initial, Jump, Statement,
+    Target, VariableType,
+};
+use super::words::{self, Control, Role};
+use std::sync::Arc;
+
+/// Longest text of the control, and of a STRING without a length.
+pub const TEXT_MAX: u16 = 400;
+/// Dimensions of an array.
+const DIMENSIONS_MAX: usize = 3;
+
+/// Reads the statement that `control` opens; its word stands at `columns`.
+pub fn statement(control: Control, lexer: &mut Lexer, columns: Columns) -> Outcome<Statement> {
+    Ok(match control {
+        Control::Define => Statement::Define(definition(lexer)?),
+        Control::Declaration => Statement::Words(Vec::new()),
+        Control::If => {
+            let condition = expression(lexer)?;
+            match jump_word(lexer) {
+                Some(direction) => Statement::IfJump(condition, jump(direction, lexer)?),
+                None => Statement::If(condition),
+            }
+        }
+        Control::Else => Statement::Else,
+        Control::EndIf => Statement::EndIf,
+        Control::For => Statement::For(Box::new(for_loop(lexer)?)),
+        Control::EndFor => Statement::EndFor,
+        Control::While => Statement::While(expression(lexer)?),
+        Control::EndWhile => Statement::EndWhile,
+        Control::Loop => Statement::Loop,
+        Control::EndLoop => Statement::EndLoop,
+        Control::Repeat if lexer.at_end() => Statement::Repeat,
+        Control::Repeat => return Err(not_built("REPEAT label", "block repetition is not built yet", columns)),
+        Control::Until => Statement::Until(expression(lexer)?),
+        Control::Jump(direction) => Statement::Jump(jump(direction, lexer)?),
+        Control::Case => Statement::Case(Box::new(case(lexer)?)),
+    })
+}
+
+/// GOTOF and its kin, if one of them comes next.
+fn jump_word(lexer: &mut Lexer) -> Option<Direction> {
+    let mut ahead = *lexer;
+    match ahead.name().and_then(words::role) {
+        Some(Role::Control(Control::Jump(direction))) => {
+            *lexer = ahead;
+            Some(direction)
+        }
+        _ => None,
+    }
+}
+
+fn jump(direction: Direction, lexer: &mut Lexer) -> Outcome<Jump> {
+    let start = lexer.position();
+    if direction == Direction::Start {
+        return Ok(Jump { direction, destination: None, columns: lexer.columns_of_next() });
+    }
+    let mut ahead = *lexer;
+    let destination = match ahead.token()? {
+        Token::Number(Number::Int(number)) if number >= 0 => Destination::Number(u64::from(number.unsigned_abs())),
+        Token::Name(name) => match block_number(name) {
+            Some(number) => Destination::Number(number),
+            None => Destination::Name(name.to_ascii_uppercase().into()),
+        },
+        Token::Text(_) => {
+            ahead = *lexer;
+            Destination::Text(expression(&mut ahead)?)
+        }
+        _ => return Err(expected(lexer, "a label or a block number")),
+    };
+    *lexer = ahead;
+    Ok(Jump { direction, destination: Some(destination), columns: lexer.columns_from(start) })
+}
+
+/// `N90` -> 90.
+pub fn block_number(name: &str) -> Option<u64> {
+    let digits = name.strip_prefix(['N', 'n'])?;
+    if digits.bytes().all(|byte| byte.is_ascii_digit()) { digits.parse().ok() } else { None }
+}
+
+fn keyword(lexer: &mut Lexer, word: &str) -> bool {
+    let mut ahead = *lexer;
+    let found = ahead.name().is_some_and(|name| name.eq_ignore_ascii_case(word));
+    if found {
+        *lexer = ahead;
+    }
+    found
+}
+
+fn for_loop(lexer: &mut Lexer) -> Outcome<ForLoop> {
+    let start = lexer.position();
+    let mut counter = *lexer;
+    let target = match expression(&mut counter).map(|counter| counter.kind) {
+        Ok(ExprKind::Parameter(index)) => Target::Parameter(*index),
+        Ok(ExprKind::Variable { name, indices }) => Target::Variable { name, indices },
+        _ => return Err(expected(lexer, "the variable that counts")),
+    };
+    *lexer = counter;
+    let counter_columns = lexer.columns_from(start);
+    if !lexer.take("=") {
+        return Err(expected(lexer, "`=`"));
+    }
+    let first = expression(lexer)?;
+    if !keyword(lexer, "TO") {
+        return Err(expected(lexer, "TO"));
+    }
+    Ok(ForLoop { counter: target, counter_columns, first, last: expression(lexer)? })
+}
+
+fn case(lexer: &mut Lexer) -> Outcome<Case> {
+    let selector = expression(lexer)?;
+    if !keyword(lexer, "OF") {
+        return Err(expected(lexer, "OF"));
+    }
+    let mut branches = Vec::new();
+    let mut default = None;
+    while !lexer.at_end() && default.is_none() {
+        let value = if keyword(lexer, "DEFAULT") { None } else { Some(expression(lexer)?) };
+        let Some(direction) = jump_word(lexer) else { return Err(expected(lexer, "GOTOF or another jump")) };
+        let target = jump(direction, lexer)?;
+        match value {
+            Some(value) => branches.push((value, target)),
+            None => default = Some(target),
+        }
+    }
+    Ok(Case { selector, branches, default })
+}
+
+fn definition(lexer: &mut Lexer) -> Outcome<Definition> {
+    let variable_type = variable_type(lexer)?;
+    let mut variables = vec![defined_variable(lexer)?];
+    while lexer.take(",") {
+        variables.push(defined_variable(lexer)?);
+    }
+    Ok(Definition { variable_type, variables })
+}
+
+fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
+    let before = *lexer;
+    let name = lexer.name().unwrap_or_default().to_ascii_uppercase();
+    Ok(match name.as_str() {
+        "BOOL" => VariableType::Bool,
+        "CHAR" => VariableType::Char,
+        "INT" => VariableType::Int,
+        "REAL" => VariableType::Real,
+        "STRING" => VariableType::Text(text_length(lexer)?),
+        "AXIS" | "FRAME" => {
+            return Err(not_built(&name, "variables of this type are not built yet", before.columns_of_next()));
+        }
+        _ => return Err(expected(&before, "a type: BOOL, CHAR, INT, REAL or STRING[n]")),
+    })
+}
+
+fn text_length(lexer: &mut Lexer) -> Outcome<u16> {
+    let start = lexer.position();
+    if !lexer.take("[") {
+        return Ok(TEXT_MAX);
+    }
+    let length = match expression(lexer)?.kind {
+        ExprKind::Int(length) => u16::try_from(length).ok().filter(|length| (1..=TEXT_MAX).contains(length)),
+        _ => None,
+    };
+    if !lexer.take("]") {
+        return Err(expected(lexer, "`]`"));
+    }
+    length.ok_or_else(|| {
+        Fault::new(codes::OUT_OF_RANGE, lexer.columns_from(start), "this length of a STRING is not possible")
+            .label(format!("expected 1 to {TEXT_MAX}"))
+    })
+}
+
+fn defined_variable(lexer: &mut Lexer) -> Outcome<DefinedVariable> {
+    let start = lexer.position();
+    let Some(name) = lexer.name() else { return Err(expected(lexer, "the name of a variable")) };
+    let columns = lexer.columns_from(start);
+    check_name(name, &columns)?;
+    let dimensions = indices(lexer)?;
+    if dimensions.len() > DIMENSIONS_MAX {
+        return Err(Fault::new(codes::BAD_INDEX, lexer.columns_from(start), "an array has at most three dimensions")
+            .label("too many"));
+    }
+    let initial = if lexer.take("=") { initial(lexer)? } else { Initial::None };
+    Ok(DefinedVariable { name: Arc::from(name.to_ascii_uppercase()), columns, dimensions, initial })
+}
+
+/// Names of variables begin with two letters or underscores and are not words of the language.
+fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
+    let letter = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';
+    let starts_well = match name.as_bytes() {
+        [first] => letter(*first),
+        [first, second, ..] => letter(*first) && letter(*second),
+        [] => false,
+    };
+    if !starts_well {
+        return Err(Fault::new(
+            codes::REDECLARED,
+            columns.clone(),
+            format!("`{name}` cannot be the name of a variable"),
+        )
+        .label("expected two letters or underscores at its start")
+        .maybe_help(name.starts_with(['R', 'r']).then(|| "R parameters need no DEF".to_owned())));
+    }
+    if name.len() == 1 || words::role(name).is_some() {
+        return Err(Fault::new(codes::REDECLARED, columns.clone(), format!("`{name}` is a word of the language"))
+            .label("expected a name of its own"));
+    }
+    Ok(())
+}
+
+/// Used by checks: the variables that an expression names.
+pub fn visit_names(expression: &Expr, visit: &mut impl FnMut(&Arc<str>, &Columns)) {
+    match &expression.kind {
+        ExprKind::Variable { name, indices } => {
+            visit(name, &expression.columns);
+            indices.iter().for_each(|index| visit_names(index, visit));
+        }
+        ExprKind::Parameter(index) => visit_names(index, visit),
+        ExprKind::Unary(_, operand) => visit_names(operand, visit),
+        ExprKind::Binary(_, operands) => {
+            visit_names(&operands.0, visit);
+            visit_names(&operands.1, visit);
+        }
+        ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| visit_names(argument, visit)),
+        ExprKind::Bool(_) | ExprKind::Int(_) | ExprKind::Real(_) | ExprKind::Text(_) => {}
+    }
+}
