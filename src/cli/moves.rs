@@ -3,8 +3,8 @@
 use super::FOUND_WRONG;
 use super::inputs::{MachineChoice, open_program};
 use super::output::show;
-use crate::base::{AxisKind, units};
-use crate::interpreter::{self, Feed, Interpreter, Move, MoveKind};
+use crate::base::{AxisKind, PartPoint, units};
+use crate::interpreter::{Interpreter, Listing, Move, MoveKind, feed_per_minute};
 use crate::machine::Machine;
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -27,10 +27,12 @@ pub(super) fn moves(arguments: &MovesArguments) -> Result<(), u8> {
     let loaded = arguments.machine.load()?;
     let program = open_program(&arguments.program)?;
     let mut interpreter = Interpreter::new(program, &loaded.machine);
+    let mut listing = Listing::new(&loaded.machine);
     // Streamed: the program may have ten million blocks. A closed pipe is the reader's way to say "enough".
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     let mut open = true;
     let mut first = true;
+    let mut start = home(&loaded.machine);
     if arguments.json {
         open = out.write_all(b"{\"format\": 1, \"moves\": [").is_ok();
     }
@@ -39,9 +41,9 @@ pub(super) fn moves(arguments: &MovesArguments) -> Result<(), u8> {
             Ok(Some(next)) if open => {
                 let text = if arguments.json {
                     let separator = if std::mem::take(&mut first) { "\n " } else { ",\n " };
-                    format!("{separator}{}", json_of(&next, &loaded.machine))
+                    format!("{separator}{}", json_of(&next, std::mem::replace(&mut start, next.end), &loaded.machine))
                 } else {
-                    interpreter::format_move(&next, &loaded.machine) + "\n"
+                    listing.line(&next) + "\n"
                 };
                 open = out.write_all(text.as_bytes()).is_ok();
             }
@@ -67,7 +69,8 @@ pub(super) fn moves(arguments: &MovesArguments) -> Result<(), u8> {
     }
 }
 
-fn json_of(next: &Move, machine: &Machine) -> Value {
+/// `feed_mm_min` is null for rapids, and deg/min where only rotary axes move.
+fn json_of(next: &Move, start: PartPoint, machine: &Machine) -> Value {
     let mut end = Map::new();
     for id in machine.axis_ids() {
         let axis = machine.axis(id);
@@ -89,11 +92,7 @@ fn json_of(next: &Move, machine: &Machine) -> Value {
     };
     fields.insert("kind".into(), json!(kind));
     fields.insert("end".into(), Value::Object(end));
-    let feed_mm_min = match next.feed {
-        Feed::Path { feed_lu_s } => json!(units::mm_min_from_mm_s(feed_lu_s)),
-        Feed::Rapid => Value::Null,
-    };
-    fields.insert("feed_mm_min".into(), feed_mm_min);
+    fields.insert("feed_mm_min".into(), json!(feed_per_minute(machine, start, next)));
     match next.kind {
         MoveKind::Arc(arc) => {
             let names: Vec<&str> = arc.plane.iter().map(|id| machine.axis(*id).name.as_str()).collect();
@@ -108,4 +107,13 @@ fn json_of(next: &Move, machine: &Machine) -> Value {
         _ => {}
     }
     Value::Object(fields)
+}
+
+/// Where the axes stand before the first move.
+fn home(machine: &Machine) -> PartPoint {
+    let mut posture = PartPoint::default();
+    for id in machine.axis_ids() {
+        posture.0[id] = machine.axis(id).home_lu;
+    }
+    posture
 }
