@@ -1,4 +1,6 @@
-//! The wire out of kinematics.
+//! The wire out of kinematics: motion of the machine axes along the path.
+//!
+//! In: nothing (plain data). Out: [`JointPath`], [`JointState`]. Does not know speed.
 
 use crate::base::{AxisVector, MachinePoint};
 use crate::smoothing::ContourPiece;

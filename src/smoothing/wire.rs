@@ -1,4 +1,6 @@
-//! The wire out of smoothing.
+//! The wire out of smoothing: the contour, piece by piece.
+//!
+//! In: nothing (plain data). Out: [`ContourPiece`]. Does not know speed or machine space.
 
 use crate::geometry::Curve;
 use crate::interpreter::{Event, Feed, Modes};
