@@ -4,7 +4,7 @@ use crate::support::{Program, Random, spinner};
 use sollwert::base::AxisId;
 use sollwert::feed::{LimitKind, PlannedPiece};
 use sollwert::interpolator::Setpoint;
-use sollwert::machine::{Machine, PathMode};
+use sollwert::machine::{AccelerationMode, Machine, PathMode};
 use sollwert::smoothing::PieceKind;
 
 /// Central differences: velocity, acceleration and jerk of one axis around tick k.
@@ -158,6 +158,30 @@ fn arcs_and_helices_keep_all_limits() {
                 );
             }
             check(&program, &machine, &format!("machine {m} seed {seed}"));
+        }
+    }
+}
+
+/// BRISK: acceleration steps, but not beyond its limit.
+#[test]
+fn brisk_paths_keep_velocity_and_acceleration() {
+    for (m, machine) in machines().into_iter().enumerate() {
+        for seed in 0..6 {
+            let mut random = Random::new(600 + seed);
+            let walk = random.walk(30, 0.05, 50.0);
+            let mut program = Program::new(PathMode::G642, random.logarithmic(500.0, 15_000.0));
+            program.modes.acceleration_mode = AccelerationMode::Brisk;
+            walk.iter().for_each(|p| program.line(p));
+            let setpoints = program.setpoints(&machine);
+            for (k, setpoint) in setpoints.iter().enumerate() {
+                for axis in machine.axis_ids() {
+                    let (limits, exact) = (&machine.axis(axis).limits, &setpoint.axes[axis]);
+                    assert!(exact.velocity_lu_s.abs() <= limits.velocity_max_lu_s * (1.0 + 1e-9));
+                    let a = exact.acceleration_lu_s2.abs();
+                    assert!(a <= limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "machine {m} seed {seed} tick {k}: {a}");
+                }
+            }
+            assert_eq!(setpoints[setpoints.len() - 1].axes[AxisId::new(0)].position_lu, walk[29][0]);
         }
     }
 }
