@@ -66,16 +66,17 @@ pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: SpeedCap, je
         // "published" has the same entry; its step law is refused with the machine file.
         BlendLaw::Entry | BlendLaw::Published => scan.entry_feed(),
     };
-    let driven = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
+    let driven = feed.min(velocity.cap(LimitKind::Velocity, 1));
     let cap = driven.min(geometric);
     let ramp_cap = cap.min(SpeedCap { velocity_lu_s: RAMP_SPEED_RATIO * safe.velocity_lu_s, limit: safe.limit });
     let v = ramp_cap.velocity_lu_s;
     // At the safe feed (d) and (e) use all of their shares at most; at v the cube of the ratio of it.
     let left = 1.0 - (v / safe.velocity_lu_s).powi(3);
-    let over_left = |demand: Demand, factor: f64| Demand { ratio: demand.ratio * factor / left, ..demand };
+    let over_left =
+        |demand: Demand, factor: f64| Demand { demand_ratio: demand.demand_ratio * factor / left, ..demand };
     let jerk = over_left(jerk, 1.0);
     let coupled = over_left(coupled, v * SAMPLE_RESERVE_RATIO);
-    if !jerk_limited || coupled.ratio <= acceleration.ratio {
+    if !jerk_limited || coupled.demand_ratio <= acceleration.demand_ratio {
         return PieceLimits::new(cap, ramp_cap, acceleration, jerk, jerk_limited);
     }
     let mut limits = PieceLimits::new(cap, ramp_cap, coupled, jerk, jerk_limited);
@@ -92,8 +93,8 @@ struct Scan<'a> {
     inward: AxisVector,
     half_angle_rad: f64,
     /// w = b sinh(place * range), w = 2u - 1.
-    width: f64,
-    range: f64,
+    width_ratio: f64,
+    range_ratio: f64,
 }
 
 impl<'a> Scan<'a> {
@@ -101,9 +102,9 @@ impl<'a> Scan<'a> {
         let middle = blend.shape(0.5);
         // |S'| has its nearest zeros at w = ± i b with b about 1.4 cos(theta/2): that is how narrow the bend is.
         let half_angle_rad = blend.angle_rad() / 2.0;
-        let width = 1.4 * half_angle_rad.cos().max(SHARPEST_COSINE);
-        let range = (1.0 / width).asinh();
-        Self { rules, blend, along: middle.tangent, inward: middle.normal, half_angle_rad, width, range }
+        let width_ratio = 1.4 * half_angle_rad.cos().max(SHARPEST_COSINE);
+        let range_ratio = (1.0 / width_ratio).asinh();
+        Self { rules, blend, along: middle.tangent, inward: middle.normal, half_angle_rad, width_ratio, range_ratio }
     }
 
     /// Largest |T| of an axis: T turns from half the angle before its middle direction to half the angle after it.
@@ -114,14 +115,14 @@ impl<'a> Scan<'a> {
     }
 
     /// The blend at a place from -1 to 1.
-    fn point(&self, place: f64) -> BlendPoint {
-        let w = self.width * (place * self.range).sinh();
+    fn point(&self, place_ratio: f64) -> BlendPoint {
+        let w = self.width_ratio * (place_ratio * self.range_ratio).sinh();
         self.blend.shape(0.5 * (1.0 + w))
     }
 
     /// The demands from place -1 to 1 at equal distances.
     fn sample(&self) -> Vec<[Demand; WATCHED.len()]> {
-        let steps = (self.range / SAMPLE_STEP).ceil().max(4.0) as usize;
+        let steps = (self.range_ratio / SAMPLE_STEP).ceil().max(4.0) as usize;
         let look = |point: &BlendPoint| WATCHED.map(|watch| self.demand(watch, point));
         let mut samples = vec![look(&self.point(0.0)); 2 * steps + 1];
         for i in 1..=steps {
@@ -182,32 +183,32 @@ impl<'a> Scan<'a> {
     /// The greatest demand, next to any sample that may be the nearest to it, with the reserve for what the search misses.
     fn greatest_between(&self, samples: &[[Demand; WATCHED.len()]], watch: Watch) -> Demand {
         let sampled = greatest(samples, watch);
-        let ratio = |i: usize| samples.get(i).map_or(0.0, |sample| sample[watch as usize].ratio);
+        let ratio = |i: usize| samples.get(i).map_or(0.0, |sample| sample[watch as usize].demand_ratio);
         let step = 2.0 / (samples.len() - 1) as f64;
         let mut found = sampled;
         for i in 0..samples.len() {
             let peak = ratio(i) >= ratio(i + 1) && ratio(i) >= ratio(i.wrapping_sub(1));
-            if peak && ratio(i) * SAMPLE_RESERVE_RATIO >= sampled.ratio {
+            if peak && ratio(i) * SAMPLE_RESERVE_RATIO >= sampled.demand_ratio {
                 let near = self.searched(watch, i as f64 * step - 1.0, step);
-                if near.ratio > found.ratio {
+                if near.demand_ratio > found.demand_ratio {
                     found = near;
                 }
             }
         }
-        Demand { ratio: found.ratio * SEARCH_RESERVE_RATIO, ..found }
+        Demand { demand_ratio: found.demand_ratio * SEARCH_RESERVE_RATIO, ..found }
     }
 
     /// The greatest demand within a step of a place, by golden section.
-    fn searched(&self, watch: Watch, place: f64, step: f64) -> Demand {
+    fn searched(&self, watch: Watch, place_ratio: f64, step_ratio: f64) -> Demand {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let (mut low, mut high) = ((place - step).max(-1.0), (place + step).min(1.0));
-        let mut greatest = self.demand(watch, &self.point(place));
-        let mut look = |place: f64| {
-            let demand = self.demand(watch, &self.point(place));
-            if demand.ratio > greatest.ratio {
+        let (mut low, mut high) = ((place_ratio - step_ratio).max(-1.0), (place_ratio + step_ratio).min(1.0));
+        let mut greatest = self.demand(watch, &self.point(place_ratio));
+        let mut look = |place_ratio: f64| {
+            let demand = self.demand(watch, &self.point(place_ratio));
+            if demand.demand_ratio > greatest.demand_ratio {
                 greatest = demand;
             }
-            demand.ratio
+            demand.demand_ratio
         };
         let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
         let (mut at_a, mut at_b) = (look(a), look(b));
@@ -229,17 +230,16 @@ impl<'a> Scan<'a> {
 /// The greatest of the sampled demands.
 fn greatest(samples: &[[Demand; WATCHED.len()]], watch: Watch) -> Demand {
     let demands = samples.iter().map(|sample| sample[watch as usize]);
-    demands.fold(
-        Demand { ratio: 0.0, axis: AxisId::new(0) },
-        |most, next| if next.ratio > most.ratio { next } else { most },
-    )
+    demands.fold(Demand { demand_ratio: 0.0, axis: AxisId::new(0) }, |most, next| {
+        if next.demand_ratio > most.demand_ratio { next } else { most }
+    })
 }
 
 /// The feed at which a geometric demand reaches its limit.
 fn geometric_cap(watch: Watch, demand: Demand) -> SpeedCap {
     match watch {
-        Watch::Radial => demand.cap(LimitKind::RadialAcceleration, 2.0),
-        Watch::Tangential => demand.cap(LimitKind::TransitionJerk, 3.0),
-        _ => demand.cap(LimitKind::RadialJerk, 3.0),
+        Watch::Radial => demand.cap(LimitKind::RadialAcceleration, 2),
+        Watch::Tangential => demand.cap(LimitKind::TransitionJerk, 3),
+        _ => demand.cap(LimitKind::RadialJerk, 3),
     }
 }

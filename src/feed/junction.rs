@@ -31,7 +31,7 @@ pub(super) fn cap(rules: &AxisRules, before: &Ends, after: &Ends) -> SpeedCap {
     }
     let turn = after.start.first - before.end.first;
     let corner = rules.largest(|axis, _| turn[axis].abs() / rules.corner_steps_lu_s[axis.index()]);
-    let corner = corner.cap(LimitKind::Corner, 1.0);
+    let corner = corner.cap(LimitKind::Corner, 1);
     if before.blend || after.blend || turn.norm() > TANGENT_RAD {
         return corner;
     }
@@ -41,7 +41,7 @@ pub(super) fn cap(rules: &AxisRules, before: &Ends, after: &Ends) -> SpeedCap {
     };
     let step = |limit_lu_s3: f64| limit_lu_s3 * rules.setpoint_period_s;
     let jump = rules.largest(|axis, limits| jump[axis].abs() / step(limits.transition_jerk_max_lu_s3));
-    corner.min(jump.cap(LimitKind::TransitionJerk, 2.0))
+    corner.min(jump.cap(LimitKind::TransitionJerk, 2))
 }
 
 /// The difference of the amounts of two curvatures, along the greater one: the divisor as printed, which is too small for arcs of

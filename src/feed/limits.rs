@@ -47,7 +47,7 @@ pub(super) struct AxisRules {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Demand {
     /// Demand over limit.
-    pub ratio: f64,
+    pub demand_ratio: f64,
     /// Whose it is.
     pub axis: AxisId,
 }
@@ -102,11 +102,11 @@ impl AxisRules {
 
     /// The axis for which `ratio(axis, its limits)` is largest, the first of equal ones.
     pub(super) fn largest(&self, ratio: impl Fn(AxisId, &AxisLimits) -> f64) -> Demand {
-        let mut largest = Demand { ratio: 0.0, axis: AxisId::new(0) };
+        let mut largest = Demand { demand_ratio: 0.0, axis: AxisId::new(0) };
         for (axis, limits) in AxisId::first(self.axes.len()).zip(&self.axes) {
-            let ratio = ratio(axis, limits);
-            if ratio > largest.ratio {
-                largest = Demand { ratio, axis };
+            let demand_ratio = ratio(axis, limits);
+            if demand_ratio > largest.demand_ratio {
+                largest = Demand { demand_ratio, axis };
             }
         }
         largest
@@ -132,7 +132,7 @@ impl AxisRules {
         let velocity = self.largest(|axis, limits| share(axis) / limits.velocity_max_lu_s);
         let acceleration = self.largest(|axis, limits| share(axis) / limits.acceleration_max_lu_s2);
         let jerk = self.largest(|axis, limits| share(axis) / limits.jerk_max_lu_s3);
-        let cap = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
+        let cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
         PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
     }
 
@@ -144,10 +144,10 @@ impl AxisRules {
         let velocity = self.largest(|axis, limits| worst.first(axis) / limits.velocity_max_lu_s);
         let radial = self.largest(|axis, limits| worst.second(axis) / (ra * limits.acceleration_max_lu_s2));
         let turning = self.largest(|axis, limits| worst.third(axis) / (rj * limits.jerk_max_lu_s3));
-        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
-        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2.0));
+        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
+        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2));
         if jerk_limited {
-            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3.0));
+            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3));
         }
         let acceleration =
             self.largest(|axis, limits| worst.first(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
@@ -173,11 +173,11 @@ impl AxisRules {
         let candidate = |share: u32| {
             let x = f64::from(share) / f64::from(JERK_SHARES);
             // Lowest acceleration, so highest demand, of the two.
-            let a = acceleration.ratio.max(coupled.ratio / x).recip();
+            let a = acceleration.demand_ratio.max(coupled.demand_ratio / x).recip();
             let jerk = self
                 .largest(|axis, limits| worst.first(axis) / (left(axis, limits) - 3.0 * v * a * worst.second(axis)));
-            let mut limits = PieceLimits::new(cap, cap, Demand { ratio: 1.0 / a, ..acceleration }, jerk, true);
-            if coupled.ratio / x > acceleration.ratio {
+            let mut limits = PieceLimits::new(cap, cap, Demand { demand_ratio: 1.0 / a, ..acceleration }, jerk, true);
+            if coupled.demand_ratio / x > acceleration.demand_ratio {
                 limits.bounds.acceleration = coupled.limit(LimitKind::Jerk);
             }
             (limits.bounds.dynamics.ramp(0.0, v).duration_s(), limits)
@@ -207,12 +207,12 @@ impl AxisRules {
         let acceleration = self.largest(|axis, limits| entry(axis) / limits.acceleration_max_lu_s2);
         let jerk = self.largest(|axis, limits| worst.first(axis) / limits.jerk_max_lu_s3);
         let k = arc.curvature_per_mm();
-        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1.0));
-        let radial = Demand { ratio: acceleration.ratio * k, ..acceleration };
-        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2.0));
+        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
+        let radial = Demand { demand_ratio: acceleration.demand_ratio * k, ..acceleration };
+        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2));
         if jerk_limited {
-            let turning = Demand { ratio: jerk.ratio * k * k, ..jerk };
-            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3.0));
+            let turning = Demand { demand_ratio: jerk.demand_ratio * k * k, ..jerk };
+            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3));
         }
         PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
     }
@@ -220,12 +220,12 @@ impl AxisRules {
 
 impl Demand {
     /// The speed at which a demand that goes with its `power` reaches the limit. An axis without demand does not bind.
-    pub(super) fn cap(&self, kind: LimitKind, power: f64) -> SpeedCap {
+    pub(super) fn cap(&self, kind: LimitKind, power: u8) -> SpeedCap {
         let limit = self.limit(kind);
         let velocity_lu_s = match power {
-            2.0 => 1.0 / self.ratio.sqrt(),
-            3.0 => 1.0 / self.ratio.cbrt(),
-            _ => 1.0 / self.ratio,
+            2 => 1.0 / self.demand_ratio.sqrt(),
+            3 => 1.0 / self.demand_ratio.cbrt(),
+            _ => 1.0 / self.demand_ratio,
         };
         SpeedCap { velocity_lu_s, limit }
     }
@@ -245,8 +245,8 @@ impl PieceLimits {
         jerk_limited: bool,
     ) -> Self {
         let dynamics = Dynamics {
-            acceleration_lu_s2: 1.0 / acceleration.ratio,
-            jerk_lu_s3: jerk_limited.then_some(1.0 / jerk.ratio),
+            acceleration_lu_s2: 1.0 / acceleration.demand_ratio,
+            jerk_lu_s3: jerk_limited.then_some(1.0 / jerk.demand_ratio),
         };
         let bounds = Bounds {
             cruise: ramp_cap,
@@ -298,8 +298,8 @@ fn feed_cap(feed: Feed) -> SpeedCap {
 /// Largest |q'|, |q''| and |q'''| of each axis over an arc: axis-parallel directions between its ends included.
 struct WorstOnArc {
     /// |cos| of the polar angle, its largest; |sin| likewise.
-    cos: f64,
-    sin: f64,
+    cos_ratio: f64,
+    sin_ratio: f64,
     state: CurveState,
     plane: [AxisId; 2],
     radius_mm: f64,
@@ -312,11 +312,11 @@ impl WorstOnArc {
         let (low, high) = (a.min(b), a.max(b));
         // |cos| is 1 at multiples of pi, |sin| a quarter turn further.
         let meets = |offset_rad: f64| ((low - offset_rad) / PI).ceil() * PI + offset_rad <= high;
-        let cos = if meets(0.0) { 1.0 } else { a.cos().abs().max(b.cos().abs()) };
-        let sin = if meets(FRAC_PI_2) { 1.0 } else { a.sin().abs().max(b.sin().abs()) };
+        let cos_ratio = if meets(0.0) { 1.0 } else { a.cos().abs().max(b.cos().abs()) };
+        let sin_ratio = if meets(FRAC_PI_2) { 1.0 } else { a.sin().abs().max(b.sin().abs()) };
         Self {
-            cos,
-            sin,
+            cos_ratio,
+            sin_ratio,
             state: arc.at(0.0),
             plane: arc.plane(),
             radius_mm: arc.radius_mm().abs(),
@@ -328,9 +328,9 @@ impl WorstOnArc {
     fn in_plane(&self, axis: AxisId, along: bool) -> f64 {
         let [first, second] = self.plane;
         if axis == first {
-            if along { self.sin } else { self.cos }
+            if along { self.sin_ratio } else { self.cos_ratio }
         } else if axis == second {
-            if along { self.cos } else { self.sin }
+            if along { self.cos_ratio } else { self.sin_ratio }
         } else {
             0.0
         }

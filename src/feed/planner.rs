@@ -173,7 +173,7 @@ impl Planner {
         std::mem::take(&mut self.warnings)
     }
 
-    /// A motion whose limits are numbers; else nothing, with a warning. Checked machines and programs do not give any.
+    /// A motion whose limits are numbers; else nothing, with an error. Checked machines and programs do not give any.
     fn checked(&mut self, motion: Motion, path: &JointPath) -> Motion {
         let Motion::Moves { limits, length_lu, .. } = &motion else { return motion };
         let Bounds { dynamics, .. } = &limits.bounds;
@@ -189,7 +189,7 @@ impl Planner {
         }
         let line = path.contour.block.line;
         self.warnings.push(
-            Diagnostic::warning("F0001", format!("the motion of line {line} has no speed that every axis allows"))
+            Diagnostic::error("F0001", format!("the motion of line {line} has no speed that every axis allows"))
                 .help("look for coordinates far outside the machine, or a curve with a cusp"),
         );
         Motion::Nothing
@@ -238,11 +238,11 @@ impl Planner {
             Motion::Moves { length_lu, .. } => {
                 self.half_blend_lu = *length_lu / 2.0;
                 let half_lu = self.half_blend_lu;
-                if let Some(before) = index.checked_sub(1) {
-                    if let Motion::Moves { block_length_lu: Some(lu), .. } = &mut self.entries[before].motion {
-                        *lu += half_lu;
-                        self.changed_from = self.changed_from.min(before);
-                    }
+                if let Some(before) = index.checked_sub(1)
+                    && let Motion::Moves { block_length_lu: Some(lu), .. } = &mut self.entries[before].motion
+                {
+                    *lu += half_lu;
+                    self.changed_from = self.changed_from.min(before);
                 }
             }
             Motion::Waits { .. } => self.half_blend_lu = 0.0,
@@ -292,8 +292,9 @@ impl Planner {
         if inside.cap.velocity_lu_s < junction.velocity_lu_s {
             return inside;
         }
-        // The last block of the window may still get the half of its blend.
-        Planned { cap: junction, settled: index + 1 < self.admitted || self.window_ends_path() }
+        // The last block of the window may still get the half of its blend, unless the path rests there.
+        let last = index + 1 == self.admitted && !piece.rests_after && !self.window_ends_path();
+        Planned { cap: junction, settled: !last }
     }
 }
 

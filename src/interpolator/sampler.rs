@@ -150,10 +150,10 @@ impl Interpolator {
     }
 
     fn begin(&mut self, mut piece: PlannedPiece, k: u64, carry_s: f64) {
-        if let Some(active) = &self.active {
-            if !active.rotary_only {
-                self.path_length_mm += active.length_lu;
-            }
+        if let Some(active) = &self.active
+            && !active.rotary_only
+        {
+            self.path_length_mm += active.length_lu;
         }
         let programmed_feed_lu_s = programmed_feed_lu_s(&piece);
         let contour = &mut piece.path.contour;

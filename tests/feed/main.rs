@@ -2,4 +2,6 @@
 
 mod profile;
 mod published;
+mod sampled;
 mod support;
+mod window;
