@@ -194,9 +194,7 @@ impl Walk {
         let malformed = || Stop::from(Damage::malformed(frame.offset, "the record", "its fields do not fit in it"));
         match frame.opcode {
             op::SCHEMA | op::CHANNEL => {
-                if !self.contents.declare(frame.opcode, &self.body) {
-                    return Err(malformed());
-                }
+                return if self.contents.declare(frame.opcode, &self.body) { Ok(()) } else { Err(malformed()) };
             }
             op::METADATA | op::STATISTICS | op::CHUNK_INDEX | op::HEADER => {
                 match mcap::parse_record(frame.opcode, &self.body).map_err(|_| malformed())? {

@@ -354,8 +354,9 @@ fn damaged(path: &Path, damage: &Damage, contents: &Contents, size_bytes: u64) -
     let shown = path.display();
     let rescue = match contents.end_ns {
         Some(end_ns) => format!(
-            "{} complete chunks with {:.3} s can be rescued: {}",
+            "{} complete chunk{} with {:.3} s can be rescued: {}",
             contents.chunks,
+            if contents.chunks == 1 { "" } else { "s" },
             end_ns as f64 / NS_PER_S,
             recover_help(path)
         ),

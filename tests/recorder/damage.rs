@@ -3,6 +3,7 @@
 
 use crate::support::*;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use sollwert::recorder::*;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -133,7 +134,7 @@ fn files_that_are_no_recordings_are_told_in_plain_words() {
     let cut = open(&file("cut.mcap", &bytes[..bytes.len() * 2 / 3]));
     assert!(cut.message.contains("is not a whole recording") && cut.message.contains("at byte"), "{}", cut.message);
     let help = cut.help.unwrap();
-    assert!(help.contains("2 complete chunks") || help.contains("1 complete chunks"), "{help}");
+    assert!(help.contains("1 complete chunk with 0.999 s"), "{help}");
     assert!(help.contains("sollwert recover") && help.contains("cut.mcap"), "{help}");
     for (name, garbage) in [("garbage-empty", &b""[..]), ("garbage-text", b"hello"), ("garbage-magic", mcap::MAGIC)] {
         assert!(rescued(name, garbage).is_none());
@@ -158,7 +159,7 @@ fn read_everything(path: &Path) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, rng_seed: RngSeed::Fixed(850), ..ProptestConfig::default() })]
 
     #[test]
     fn cut_off_anywhere_a_prefix_is_rescued(share in 0.0..1.0_f64) {

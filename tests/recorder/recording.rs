@@ -300,6 +300,18 @@ fn a_chunk_ends_with_its_second_or_at_one_mebibyte() {
     assert!((1_048_576..1_070_000).contains(&chunks[0].uncompressed_size), "{}", chunks[0].uncompressed_size);
 }
 
+#[test]
+fn without_compression_the_messages_are_the_same() {
+    let machine = machine();
+    let mut setup = RecordingSetup::new(&machine, "test.toml", MACHINE_TEXT, &[]);
+    let packed = seen(&recorded(&setup, RUN_TICKS));
+    setup.compression = Compression::None;
+    let bytes = recorded(&setup, RUN_TICKS);
+    assert!(seen(&bytes) == packed);
+    let recording = Recording::open(&file("unpacked.mcap", &bytes)).unwrap();
+    assert_eq!(recording.messages().unwrap().map(Result::unwrap).count(), packed.len());
+}
+
 /// Polls until `done`, for writer threads that work meanwhile.
 fn wait_until(done: impl Fn() -> bool) {
     let start = Instant::now();

@@ -176,7 +176,7 @@ pub fn signals(tick: Tick, axis: AxisId) -> AxisSignals {
 pub fn path_sample(tick: Tick) -> PathSample {
     let k = tick.0 / TICKS_PER_SETPOINT;
     let block = BlockRef { program: ProgramId(0), line: (k % 3 + 1) as u32, number: k / 100 + 1 };
-    let rapid = k % 5 == 0;
+    let rapid = k.is_multiple_of(5);
     PathSample {
         block,
         path_length_mm: k as f64 * 0.1,
@@ -184,7 +184,7 @@ pub fn path_sample(tick: Tick) -> PathSample {
         programmed_feed_lu_s: (!rapid).then_some(60.0),
         acceleration_lu_s2: 1.0 / 3.0,
         jerk_lu_s3: -2.0,
-        limit: Limit { kind: LimitKind::Jerk, axis: (k % 2 == 0).then(|| AxisId::new(2)) },
+        limit: Limit { kind: LimitKind::Jerk, axis: k.is_multiple_of(2).then(|| AxisId::new(2)) },
         buffered_blocks: (k % 9) as u32,
         rotary_only: k % 4 == 3,
     }
