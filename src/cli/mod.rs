@@ -29,6 +29,9 @@ const UNREADABLE: u8 = 2;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Say on stderr what happens at the borders: start, alarm, end
+    #[arg(short, long, global = true)]
+    verbose: bool,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -65,6 +68,9 @@ enum Command {
 /// Reads the command line, does the work, returns the exit code.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    if arguments.verbose {
+        tracing_subscriber::fmt().with_writer(std::io::stderr).with_ansi(output::stderr_colour()).without_time().init();
+    }
     let code = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Time(arguments) => time::time(&arguments),

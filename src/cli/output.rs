@@ -9,12 +9,17 @@ use std::time::{Duration, Instant};
 
 /// Shows findings on stderr, coloured on a terminal unless NO_COLOR is set.
 pub(super) fn show<'a>(findings: impl IntoIterator<Item = &'a Diagnostic>) {
-    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let colour = stderr_colour();
     let mut stderr = std::io::stderr().lock();
     for finding in findings {
         // Nothing is left to do when stderr is gone.
         let _ = writeln!(stderr, "{}", finding.render(colour));
     }
+}
+
+/// Colour on stderr: on a terminal, unless NO_COLOR is set.
+pub(super) fn stderr_colour() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
 /// Prints a text to stdout.

@@ -56,7 +56,11 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), u8> {
     let program = open_program(&arguments.program)?;
     let recording = arguments.output.clone().unwrap_or_else(|| default_recording(&arguments.program));
     refuse_same_file(&arguments.program, &recording)?;
-    let signals = parse_signals(arguments.record.as_deref(), &machine)?;
+    let mut signals = parse_signals(arguments.record.as_deref(), &machine)?;
+    if arguments.no_drives {
+        // Without drives every wire behind the set-point is a copy of it: only what was computed is recorded.
+        signals = signals.and(&SignalChoice::setpoints());
+    }
     let options = RunOptions {
         machine: &machine,
         program,

@@ -77,6 +77,7 @@ pub struct RunError(pub Diagnostic);
 /// Runs `options.program` to its end.
 pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Result<RunOutcome, RunError> {
     let machine = Arc::new(options.machine.machine.clone());
+    tracing::info!(program = options.program.file_name(), machine = %machine.name, threads = options.threads, drives = options.drives, "run starts");
     let preparation = Preparation::new(options.program.clone(), &machine);
     if options.threads > 1 {
         let source = PreparationThread::spawn(preparation)
@@ -158,6 +159,9 @@ fn conclude<S: PieceSource>(
         warnings.push(Diagnostic::warning("K0002", message));
     }
     let alarm = drive_alarm.or(findings.alarm);
+    if let Some(alarm) = &alarm {
+        tracing::error!(code = alarm.code, line = alarm.line(), message = %alarm.message, "alarm");
+    }
     let mut summary = RunSummary::new(&machine, options.program.file_name(), kernel.figures(), options.drives);
     summary.add_warnings(&warnings);
     if let Some(alarm) = &alarm {
@@ -175,6 +179,7 @@ fn conclude<S: PieceSource>(
             Some(recorder.finish(&document).map_err(RunError)?)
         }
     };
+    tracing::info!(setpoints = summary.setpoints, cycle_time_s = summary.cycle_time_s, blocks = summary.blocks, "run ends");
     Ok(RunOutcome { summary, warnings, alarm, deadlines, recording })
 }
 
