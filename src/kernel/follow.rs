@@ -67,7 +67,7 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
         None => None,
         Some(path) => {
             let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, &[]);
-            setup.signals = options.signals.clone();
+            setup.signals = options.signals;
             setup.mantissa_bits = options.mantissa_bits;
             Some(Recorder::to_file(path, &setup)?)
         }

@@ -137,7 +137,7 @@ fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Opt
     let programs = std::slice::from_ref(&main);
     let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, programs);
     setup.mantissa_bits = options.mantissa_bits;
-    setup.signals = options.signals.clone();
+    setup.signals = options.signals;
     Recorder::to_file(path, &setup).map(Some).map_err(RunError)
 }
 
@@ -179,7 +179,12 @@ fn conclude<S: PieceSource>(
             Some(recorder.finish(&document).map_err(RunError)?)
         }
     };
-    tracing::info!(setpoints = summary.setpoints, cycle_time_s = summary.cycle_time_s, blocks = summary.blocks, "run ends");
+    tracing::info!(
+        setpoints = summary.setpoints,
+        cycle_time_s = summary.cycle_time_s,
+        blocks = summary.blocks,
+        "run ends"
+    );
     Ok(RunOutcome { summary, warnings, alarm, deadlines, recording })
 }
 

@@ -56,13 +56,14 @@ impl SetpointTable {
     pub fn from_recording(recording: &Recording, machine: &Machine) -> Result<Self, Diagnostic> {
         let name = recording.path().display().to_string();
         let field = axis_field("position_setpoint");
-        let mut samples: Vec<(AxisId, f64, Vec<(u64, f64)>)> = Vec::new();
+        let mut samples: Vec<Sampled> = Vec::new();
         let mut by_topic = vec![None; recording.topics().len()];
         for (topic, known) in recording.topics().iter().enumerate() {
             let TopicKind::Axis { name, kind } = &known.kind else { continue };
             if let Some(axis) = machine.axis_by_name(name) {
                 by_topic[topic] = Some(samples.len());
-                samples.push((axis, if *kind == AxisKind::Rotary { units::RAD_PER_DEG } else { 1.0 }, Vec::new()));
+                let scale_ratio = if *kind == AxisKind::Rotary { units::RAD_PER_DEG } else { 1.0 };
+                samples.push(Sampled { axis, scale_ratio, rows: Vec::new() });
             }
         }
         for message in recording.messages()? {
@@ -71,21 +72,17 @@ impl SetpointTable {
                 (by_topic[message.topic], &message.content, field)
                 && let Some(value) = sample.get(field)
             {
-                let (_, scale_ratio, values) = &mut samples[place];
-                values.push((message.time_ns, value * *scale_ratio));
+                let column = &mut samples[place];
+                column.rows.push((message.time_ns, value * column.scale_ratio));
             }
         }
         Self::from_samples(&name, machine, samples)
     }
 
     /// Rows at the fastest position cycle; a slower axis is held.
-    fn from_samples(
-        name: &str,
-        machine: &Machine,
-        samples: Vec<(AxisId, f64, Vec<(u64, f64)>)>,
-    ) -> Result<Self, Diagnostic> {
+    fn from_samples(name: &str, machine: &Machine, samples: Vec<Sampled>) -> Result<Self, Diagnostic> {
         let time_base = &machine.cycle.time_base;
-        let end_ns = samples.iter().filter_map(|(_, _, values)| values.last()).map(|(time_ns, _)| *time_ns).max();
+        let end_ns = samples.iter().filter_map(|column| column.rows.last()).map(|(time_ns, _)| *time_ns).max();
         let Some(end_ns) = end_ns else {
             let message = format!("`{name}` holds no position set-points of an axis of this machine");
             return Err(Diagnostic::error("F0004", message));
@@ -95,7 +92,7 @@ impl SetpointTable {
         while row_ns(table.rows as u64) <= end_ns {
             table.rows += 1;
         }
-        for (axis, _, values) in samples.into_iter().filter(|(_, _, values)| !values.is_empty()) {
+        for Sampled { axis, rows: values, .. } in samples.into_iter().filter(|column| !column.rows.is_empty()) {
             let mut column = Vec::with_capacity(table.rows);
             let mut at = 0;
             for row in 0..table.rows as u64 {
@@ -139,6 +136,15 @@ impl SetpointTable {
         }
         Ok(table)
     }
+}
+
+/// Positions of one axis out of a recording.
+struct Sampled {
+    axis: AxisId,
+    /// From the unit of the recording to mm or rad.
+    scale_ratio: f64,
+    /// Time in ns, position in mm or rad.
+    rows: Vec<(u64, f64)>,
 }
 
 #[derive(Clone, Copy)]
