@@ -65,6 +65,7 @@ fn axis(gravity_sin_n_m: f64) -> (Axis, TimeBase) {
         travel_lu: None,
         home_lu: 0.0,
         modulo: false,
+        dynamics: Default::default(),
         drive: Some(drive),
     };
     (axis, TimeBase::new((1_000_000, 1), 16))

@@ -34,6 +34,7 @@ fn machine(rotary: [&str; 2], kinematics: KinematicsSettings) -> Machine {
         travel_lu: None,
         home_lu: 0.0,
         modulo: false,
+        dynamics: Default::default(),
         drive: None,
     };
     Machine {

@@ -33,6 +33,7 @@ fn machine() -> Machine {
         travel_lu: None,
         home_lu: 0.0,
         modulo: false,
+        dynamics: Default::default(),
         drive: None,
     };
     Machine {

@@ -146,6 +146,7 @@ pub fn axis(drive: Option<DriveData>) -> Axis {
         travel_lu: None,
         home_lu: 0.0,
         modulo: false,
+        dynamics: Default::default(),
         drive,
     }
 }

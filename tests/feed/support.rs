@@ -30,6 +30,7 @@ pub fn spinner() -> Machine {
         travel_lu: None,
         home_lu: 0.0,
         modulo: false,
+        dynamics: Default::default(),
         drive: None,
     };
     Machine {

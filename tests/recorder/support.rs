@@ -78,6 +78,7 @@ pub fn machine() -> Machine {
         travel_lu: None,
         home_lu: 0.0,
         modulo: false,
+        dynamics: Default::default(),
         drive,
     };
     Machine {
