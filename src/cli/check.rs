@@ -1,4 +1,6 @@
 //! `sollwert check`: all diagnostics of a program.
+//!
+//! In: program, machine. Out: findings on stderr, a count or JSON on stdout. Does not plan or simulate.
 
 use super::FOUND_WRONG;
 use super::inputs::{MachineChoice, open_program};

@@ -1,4 +1,6 @@
 //! `sollwert export`: a recording as CSV.
+//!
+//! In: a recording. Out: a CSV on the disk, complete or not there at all. Does not resample or convert units.
 
 use super::inputs::refuse_same_file;
 use super::output::{print, print_json, show};

@@ -1,4 +1,6 @@
 //! `sollwert follow`: the drives alone, fed with given position set-points.
+//!
+//! In: a CSV or a recording, machine. Out: a recording, figures. Does not plan, interpolate or resample.
 
 use super::inputs::{MachineChoice, default_recording, refuse_same_file};
 use super::output::{print, print_json, show};

@@ -1,4 +1,6 @@
 //! Arguments that several sub-commands share, and what they load.
+//!
+//! In: `-m`, `--set`, paths. Out: machine and program, or findings on stderr and an exit code. Does not run anything.
 
 use super::output::show;
 use super::{FOUND_WRONG, UNREADABLE};

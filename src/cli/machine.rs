@@ -1,4 +1,6 @@
 //! `sollwert machine`: machine files.
+//!
+//! In: a machine file or the name of a shipped one. Out: verdict, overview, schema or text. Does not run anything.
 
 use super::inputs::MachineChoice;
 use super::output::{print, print_json, show, table};

@@ -1,4 +1,6 @@
 //! `sollwert moves`: what the interpreter makes of a program.
+//!
+//! In: program, machine. Out: one line or one JSON object a move, streamed. Does not smooth or plan.
 
 use super::FOUND_WRONG;
 use super::inputs::{MachineChoice, open_program};

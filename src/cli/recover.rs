@@ -1,4 +1,6 @@
 //! `sollwert recover`: what an interrupted run left.
+//!
+//! In: a damaged recording. Out: a whole one, and what was rescued. Does not change its input.
 
 use super::UNREADABLE;
 use super::inputs::refuse_same_file;

@@ -1,4 +1,6 @@
 //! `sollwert run`: replay a program, record everything.
+//!
+//! In: program, machine, options. Out: a recording, figures as table or JSON, findings. Does not compute any of them.
 
 use super::inputs::{MachineChoice, default_recording, open_program, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show, table};

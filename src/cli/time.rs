@@ -1,4 +1,6 @@
 //! `sollwert time`: set-points only, no recording.
+//!
+//! In: programs, machine. Out: figures as tables or one JSON document. Does not simulate drives.
 
 use super::FOUND_WRONG;
 use super::UNREADABLE;

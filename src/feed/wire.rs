@@ -1,4 +1,6 @@
 //! The wire out of feed.
+//!
+//! In: nothing (plain data). Out: [`PlannedPiece`], [`TimeLaw`] and [`Limit`]. Does not plan.
 
 use crate::base::AxisId;
 use crate::kinematics::JointPath;

@@ -1,4 +1,6 @@
 //! The wire out of the interpolator.
+//!
+//! In: nothing (plain data). Out: [`Setpoint`] and its parts. Does not sample.
 
 use crate::base::{PerAxis, Tick};
 use crate::feed::Limit;

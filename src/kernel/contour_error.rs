@@ -74,7 +74,7 @@ mod tests {
         }
         // The line has direction (1, 2)/sqrt 5: an offset of 0.01 along (2, -1)/sqrt 5 is the distance itself.
         let offset = 0.01 / 5.0_f64.sqrt();
-        let seen = meter.distance_mm([50.0 + 2.0 * offset, 100.0 - offset, 0.0]).unwrap();
+        let seen = meter.distance_mm([99.0 + 2.0 * offset, 198.0 - offset, 0.0]).unwrap();
         assert!((seen - 0.01).abs() < 1e-12, "{seen}");
     }
 }

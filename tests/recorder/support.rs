@@ -21,11 +21,10 @@ pub const TICKS_PER_S: u64 = 4000;
 /// A machine file; the recorder does not read it.
 pub const MACHINE_TEXT: &str = "format = 1\nname = \"Test machine, ä\"\n";
 /// Figures of a run; `recording` must not get into the file.
-pub const SUMMARY: &str = r#"{"format": 1, "program": "/home/someone/main.mpf", "cycle_time_s": 0.1, "limits": {"feed": 0.25, "X.jerk": 0.75}, "recording": "/home/someone/out.mcap"}"#;
+pub const SUMMARY: &str = r#"{"format": 1, "program": "folder_of_someone/main.mpf", "cycle_time_s": 0.1, "limits": {"feed": 0.25, "X.jerk": 0.75}, "recording": "folder_of_someone/out.mcap"}"#;
 
-/// Linear X with a drive, linear Y without one, rotary C with a drive.
-pub fn machine() -> Machine {
-    let drive = DriveData {
+fn drive() -> DriveData {
+    DriveData {
         identified: false,
         in_position_coarse_lu: 0.04,
         in_position_fine_lu: 0.01,
@@ -62,7 +61,12 @@ pub fn machine() -> Machine {
             gravity_cos_n_m: 0.0,
         },
         encoder: EncoderData { position_resolution_lu: 0.0, motor_resolution_rad: 0.0 },
-    };
+    }
+}
+
+/// Linear X with a drive, linear Y without one, rotary C with a drive.
+pub fn machine() -> Machine {
+    let drive = drive();
     let axis = |name: &str, kind, index, drive| Axis {
         name: name.to_owned(),
         kind,
