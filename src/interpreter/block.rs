@@ -12,7 +12,7 @@ use super::wire::{Event, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::machine::{AccelerationMode, PathMode};
 use crate::program::syntax::{Address, AddressValue, Form, Target, Word, WordKind};
-use crate::program::words::{GFunction, Keyword, Role, role};
+use crate::program::words::{GFunction, Keyword};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 
 /// M6: the tool change comes before the motion of its block, at rest.
@@ -354,12 +354,4 @@ fn whole(typed: f64, columns: &Columns, address: &str) -> Outcome<u32> {
         Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{address}{typed} is not possible"))
             .label("expected a whole number from 0 to 2147483647")
     })
-}
-
-/// The entry of a word that is not acted on.
-pub(super) fn not_acted_on(word: &str) -> Option<&'static crate::program::NotActedOn> {
-    match role(word) {
-        Some(Role::NotActedOn(entry)) => Some(entry),
-        _ => None,
-    }
 }

@@ -4,7 +4,6 @@
 //! translations only. Checks travel at programmed end points (a warning: the control would stop with alarm 10720).
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
-use super::block::not_acted_on;
 use super::modal::Motion;
 use super::run::Interpreter;
 use super::value::trimmed;
@@ -14,7 +13,7 @@ use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
 use crate::program::plain::PlainBlock;
 use crate::program::syntax::Form;
 use crate::program::words::Plane;
-use crate::program::{Columns, Fault, Outcome, codes};
+use crate::program::{Columns, Fault, NotActedOn, Outcome, codes};
 use std::f64::consts::{PI, TAU};
 
 /// Angles nearer than this are the same for DC, ACP and ACN: below any digit that a program carries.
@@ -142,7 +141,7 @@ impl Interpreter {
                 return false;
             }
         }
-        if end != start && !straight {
+        if !straight {
             return false;
         }
         for id in machine.axis_ids() {
@@ -241,12 +240,10 @@ impl Interpreter {
         let start_mm = plane.map(|id| self.position.0[id]);
         let end_mm = plane.map(|id| end.0[id]);
         let across = 3 - indices[0] - indices[1];
-        if let Some(word) = &words.centre[across] {
-            if word.typed != 0.0
-                && let Some(entry) = not_acted_on("KIJ")
-            {
-                self.report_word(entry, &word.columns);
-            }
+        if let Some(word) = words.centre[across].as_ref().filter(|word| word.typed != 0.0)
+            && let Some(entry) = NotActedOn::find("I/J/K")
+        {
+            self.report_word(entry, &word.columns);
         }
         let in_plane = indices.map(|index| words.centre[index].as_ref());
         let has_centre = in_plane.iter().any(Option::is_some);
@@ -327,7 +324,7 @@ impl Interpreter {
             let fault = Fault::new(codes::TRAVEL, word.columns.clone(), message)
                 .label("outside the travel")
                 .help("the control would raise alarm 10720; the simulation goes on, and further positions of this axis are not reported");
-            self.warn(fault);
+            self.warn(*fault);
         }
     }
 }
@@ -338,7 +335,7 @@ fn outside(travel_lu: Option<[f64; 2]>, position_lu: f64) -> Option<(f64, f64)> 
     if position_lu < low_lu {
         return Some((low_lu, low_lu - position_lu));
     }
-    (position_lu > high_lu).then(|| (high_lu, position_lu - high_lu))
+    (position_lu > high_lu).then_some((high_lu, position_lu - high_lu))
 }
 
 /// Way of an endless axis to a position `difference_rad` away.

@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// Blocks without a move after which a loop counts as endless: well under two seconds.
-const IDLE_BLOCKS_MAX: u32 = 2_000_000;
+const IDLE_BLOCKS_MAX: u32 = 1_000_000;
 /// Parsed blocks kept for loops.
 const KEPT_BLOCKS_MAX: usize = 4096;
 
@@ -206,13 +206,13 @@ impl Interpreter {
                 format!("`{}` is not acted on: {}", entry.word, entry.consequence),
             )
             .label("known, but not acted on");
-            self.warn(fault);
+            self.warn(*fault);
         }
     }
 
     /// Puts a finding on the list of warnings.
-    pub(super) fn warn(&mut self, fault: Box<Fault>) {
-        let mut diagnostic = self.diagnostic(*fault);
+    pub(super) fn warn(&mut self, fault: Fault) {
+        let mut diagnostic = self.diagnostic(fault);
         diagnostic.severity = crate::base::Severity::Warning;
         self.warnings.push(diagnostic);
     }

@@ -390,7 +390,6 @@ impl<'a> WordParser<'_, 'a, '_> {
                 Ok(WordKind::Silent)
             }
             Some(Role::NotActedOn(entry)) => self.pass_over(entry),
-            Some(Role::NotBuilt(reason)) => Err(not_built(name, reason, columns)),
             Some(Role::Control(_)) => {
                 Err(Fault::new(codes::BAD_BLOCK, columns, format!("`{name}` must be the first word of its block"))
                     .label("not here")
@@ -400,10 +399,11 @@ impl<'a> WordParser<'_, 'a, '_> {
                 Err(Fault::new(codes::BAD_BLOCK, columns, format!("`{name}` cannot begin a word"))
                     .label("expected an address or a word"))
             }
-            None if matches!(next, Token::Symbol("=" | "[")) => {
+            None | Some(Role::FunctionNotBuilt(_)) if matches!(next, Token::Symbol("=" | "[")) => {
                 let indices = indices(self.lexer)?;
                 self.assignment(Target::Variable { name: name.to_ascii_uppercase().into(), indices })
             }
+            Some(Role::NotBuilt(reason) | Role::FunctionNotBuilt(reason)) => Err(not_built(name, reason, columns)),
             None => Err(self.unknown_word(name, columns)),
         }
     }
@@ -474,13 +474,10 @@ pub(super) fn initial(lexer: &mut Lexer) -> Outcome<Initial> {
 }
 
 fn not_acted_on(word: &str) -> Outcome<WordKind> {
-    match words::role(word) {
-        Some(Role::NotActedOn(entry)) => Ok(WordKind::NotActedOn(entry)),
-        _ => Ok(WordKind::Silent),
-    }
+    Ok(NotActedOn::find(word).map_or(WordKind::Silent, WordKind::NotActedOn))
 }
 
 /// The whole number of an address such as M or T, if the value is one and not negative.
 pub fn whole_number(value: f64) -> Option<u32> {
-    (value >= 0.0 && value <= INTEGER_MAX && value.fract() == 0.0).then_some(value as u32)
+    ((0.0..=INTEGER_MAX).contains(&value) && value.fract() == 0.0).then_some(value as u32)
 }

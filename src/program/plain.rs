@@ -1,6 +1,6 @@
 //! The fast path for what a CAM program is made of: `N10 G1 X1.5 Y-.2 Z3. F2000`.
 //!
-//! In: bytes of a line. Out: [`PlainBlock`], or `None` for every line that holds anything else: the parser then reads it. What is
+//! In: bytes of a line, with or without a comment. Out: [`PlainBlock`], or `None` for every line that holds anything else: the parser then reads it. What is
 //! accepted here means the same as there (a test compares both on random lines). No allocation.
 
 use super::dialect::Dialect;
@@ -40,6 +40,7 @@ pub fn plain_block(line: &[u8], dialect: &Dialect) -> Option<PlainBlock> {
         let Some(letter) = line.get(at) else { return any.then_some(block) };
         at += 1;
         match letter {
+            b';' => return any.then_some(block),
             b'G' | b'g' => {
                 let start = at;
                 at = digits(line, at);
@@ -91,7 +92,7 @@ fn ends_badly(line: &[u8], at: usize) -> bool {
         // `X1 =` is an extended address; `X1EX3` has an exponent.
         Some(b' ' | b'\t') => line.get(blanks(line, at)) == Some(&b'='),
         Some(b'E' | b'e') => line.get(at + 1).is_some_and(|byte| byte.eq_ignore_ascii_case(&b'X')),
-        Some(byte) => !byte.is_ascii_alphabetic(),
+        Some(byte) => !(byte.is_ascii_alphabetic() || *byte == b';'),
     }
 }
 
