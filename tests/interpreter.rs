@@ -197,6 +197,13 @@ fn computed_jump_targets() {
 }
 
 #[test]
+fn searching_for_ever_is_an_endless_loop_too() {
+    // Every pass searches another block number through the whole program.
+    let text = format!("LOOP\nR1=R1+1\nGOTOC \"N\"<<TRUNC(R1)\nENDLOOP\n{}", "X1\n".repeat(20_000));
+    assert_eq!(run(&text).alarm().code, "E0403");
+}
+
+#[test]
 fn an_endless_loop_without_motion_is_an_alarm() {
     let result = run("G1 F1 X1\nLOOP\nR1=R1+1\nENDLOOP");
     assert_eq!(result.alarm().code, "E0403");
@@ -449,6 +456,13 @@ fn run_time_errors_name_their_place() {
         ("G0 X1 X2", "E0205", 6..8),
         ("M3.5", "E0306", 0..4),
         ("S-5", "E0306", 0..3),
+        ("G0 X1EX9", "E0306", 3..8),
+        ("G1 F1 G3 X1 I-1EX300", "E0205", 6..8),
+        ("G3 F1 X1 I-1EX300", "E0306", 9..17),
+        ("G3 F1 X1 CR=1EX300", "E0306", 9..18),
+        ("G3 F1 I5 TURN=1000", "E0306", 9..18),
+        ("G4 F1EX9", "E0507", 0..2),
+        ("G1 X1 F1EX-9", "E0502", 6..12),
     ];
     for (text, code, columns) in cases {
         let result = run(text);

@@ -4,6 +4,7 @@
 //! translations only. Checks travel at programmed end points (a warning: the control would stop with alarm 10720).
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
+use super::block::FEED_MIN;
 use super::modal::Motion;
 use super::run::Interpreter;
 use super::value::trimmed;
@@ -11,7 +12,7 @@ use super::wire::{ArcGeometry, Event, Feed, MoveKind};
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
 use crate::program::plain::PlainBlock;
-use crate::program::syntax::Form;
+use crate::program::syntax::{Form, Typed};
 use crate::program::words::Plane;
 use crate::program::{Columns, Fault, NotActedOn, Outcome, codes};
 use std::f64::consts::{PI, TAU};
@@ -19,11 +20,14 @@ use std::f64::consts::{PI, TAU};
 /// Angles nearer than this are the same for DC, ACP and ACN: below any digit that a program carries.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
+/// Largest position, centre and radius (mm, rad): ten kilometres. Beyond it a typing error is certain, and squares would lose digits.
+const LENGTH_MAX_LU: f64 = 1e7;
+
 /// An axis word (or I, J, K) as typed.
 #[derive(Clone, Debug)]
 pub(super) struct AxisWord {
     /// mm, inch or degrees.
-    pub typed: f64,
+    pub typed: Typed,
     /// AC, IC, ...
     pub form: Form,
     /// Marked bytes.
@@ -38,7 +42,7 @@ pub(super) struct MotionWords {
     /// I, J, K.
     pub centre: [Option<AxisWord>; 3],
     /// CR.
-    pub radius: Option<(f64, Columns)>,
+    pub radius: Option<(Typed, Columns)>,
     /// TURN.
     pub turns: u32,
     /// G9.
@@ -119,7 +123,7 @@ impl Interpreter {
             None => self.modal.motion,
         };
         let feed = match block.feed {
-            Some(typed) if typed > 0.0 => Some(self.modal.programmed_feed(typed)),
+            Some(typed) if typed.0 >= FEED_MIN => Some(self.modal.programmed_feed(typed)),
             Some(_) => return false,
             None => self.modal.feed,
         };
@@ -137,7 +141,7 @@ impl Interpreter {
             } else {
                 end.0[id] + value_lu + offset_lu - self.applied_lu[id]
             };
-            if outside(axis.travel_lu, end.0[id]).is_some() {
+            if outside(axis.travel_lu, end.0[id]).is_some() || end.0[id].abs() > LENGTH_MAX_LU {
                 return false;
             }
         }
@@ -181,7 +185,7 @@ impl Interpreter {
         let mut end = self.position;
         for id in self.machine.axis_ids() {
             if let Some(word) = &words.axes[id] {
-                end.0[id] = self.axis_end(id, word, words.suppress_frames)?;
+                end.0[id] = bounded(self.axis_end(id, word, words.suppress_frames)?, &word.columns)?;
             }
         }
         Ok(end)
@@ -240,7 +244,7 @@ impl Interpreter {
         let start_mm = plane.map(|id| self.position.0[id]);
         let end_mm = plane.map(|id| end.0[id]);
         let across = 3 - indices[0] - indices[1];
-        if let Some(word) = words.centre[across].as_ref().filter(|word| word.typed != 0.0)
+        if let Some(word) = words.centre[across].as_ref().filter(|word| word.typed.0 != 0.0)
             && let Some(entry) = NotActedOn::find("I/J/K")
         {
             self.report_word(entry, &word.columns);
@@ -252,13 +256,17 @@ impl Interpreter {
                 return Err(Fault::new(codes::BAD_BLOCK, radius_columns.clone(), "centre and radius in one block")
                     .label("expected one of the two"));
             }
-            Some((typed, _)) => ArcShape::Radius { radius_mm: self.modal.position_lu(AxisKind::Linear, *typed) },
+            Some((typed, radius_columns)) => ArcShape::Radius {
+                radius_mm: bounded(self.modal.position_lu(AxisKind::Linear, *typed), radius_columns)?,
+            },
             None if has_centre => {
-                let centre = |k: usize| {
-                    in_plane[k]
-                        .map_or(start_mm[k], |word| self.centre(word, plane[k], start_mm[k], words.suppress_frames))
+                let centre = |k: usize| match in_plane[k] {
+                    Some(word) => {
+                        bounded(self.centre(word, plane[k], start_mm[k], words.suppress_frames), &word.columns)
+                    }
+                    None => Ok(start_mm[k]),
                 };
-                ArcShape::Centre { centre_mm: [centre(0), centre(1)] }
+                ArcShape::Centre { centre_mm: [centre(0)?, centre(1)?] }
             }
             None => {
                 return Err(Fault::new(
@@ -327,6 +335,15 @@ impl Interpreter {
             self.warn(*fault);
         }
     }
+}
+
+/// A length or angle that can be calculated with.
+fn bounded(value_lu: f64, columns: &Columns) -> Outcome<f64> {
+    if value_lu.abs() <= LENGTH_MAX_LU {
+        return Ok(value_lu);
+    }
+    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), "this value is too large for an axis")
+        .label("expected at most 1EX7"))
 }
 
 /// The limit that a position violates, and by how much.

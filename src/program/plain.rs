@@ -4,6 +4,7 @@
 //! accepted here means the same as there (a test compares both on random lines). No allocation.
 
 use super::dialect::Dialect;
+use super::syntax::Typed;
 use crate::base::{AxisId, PerAxis};
 
 /// A block of G0 or G1, axis words with plain numbers, and F.
@@ -12,9 +13,9 @@ pub struct PlainBlock {
     /// G0 (true) or G1 (false), if there is one.
     pub rapid: Option<bool>,
     /// Values of axis words, as typed.
-    pub axes: PerAxis<Option<f64>>,
+    pub axes: PerAxis<Option<Typed>>,
     /// F word, as typed.
-    pub feed: Option<f64>,
+    pub feed: Option<Typed>,
 }
 
 /// Decimal places up to which a quotient of two exact integers is correctly rounded: 10^22 and 2^53 are exact.
@@ -96,7 +97,7 @@ fn ends_badly(line: &[u8], at: usize) -> bool {
     }
 }
 
-fn number(line: &[u8], at: &mut usize) -> Option<f64> {
+fn number(line: &[u8], at: &mut usize) -> Option<Typed> {
     let negative = line.get(*at) == Some(&b'-');
     if negative || line.get(*at) == Some(&b'+') {
         *at += 1;
@@ -125,5 +126,5 @@ fn number(line: &[u8], at: &mut usize) -> Option<f64> {
     }
     let value = mantissa as f64 / POWERS[places];
     // A negative zero becomes zero, as the parser has it.
-    Some(if negative { 0.0 - value } else { value })
+    Some(Typed(if negative { 0.0 - value } else { value }))
 }
