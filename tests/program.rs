@@ -78,7 +78,9 @@ fn one_typo_is_one_error() {
         ("F100", "F100 (A)", (2, "E0105", "(")),
         ("F100", "F1.0.0", (2, "E0105", ".0")),
         ("F100", "F100 G999", (2, "E0203", "G999")),
-        ("F100", "F100 Q5", (2, "E0204", "Q5")),
+        ("F100", "F100 Q5", (2, "E0204", "Q")),
+        ("X1 Y2", "X1O Y2", (10, "E0204", "O")),
+        ("X1 Y2", "X1,5 Y2", (10, "E0105", ",")),
         ("F100", "F100 SOFTT", (2, "E0201", "SOFTT")),
     ];
     for (right, wrong, (line, code, marked)) in cases {
@@ -108,6 +110,8 @@ fn nearest_words_are_offered() {
     assert!(help("DEF REAL WIDTH\nX=WITDH").contains("WIDTH"));
     assert!(help("LABEL1: G0\nGOTOB LABLE1").contains("LABEL1"));
     assert!(help("G1 X1 F1 A5").contains("X, Y, Z"));
+    assert!(help("G1 X1O F1").contains("digit 0"));
+    assert!(help("G1 X1,5 F1").contains("point"));
     assert!(help("XR1").is_empty() || !help("XR1").contains("Sn="));
     let call = check(&ProgramSource::from_bytes("a.mpf", *b"PLATE_CONTOUR(5)"), &xyz());
     assert!(call[0].code == "E0206" && call[0].message.contains("sub-program"), "{}", call[0].message);
