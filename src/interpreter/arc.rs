@@ -130,6 +130,10 @@ fn check_shape(arc: &ProgrammedArc, adjusted: &ArcGeometry, programmed_mm: [f64;
     let start_radius_mm = distance(arc.start_mm, programmed_mm);
     let end_radius_mm = distance(arc.end_mm, programmed_mm);
     let programmed = through(arc, programmed_mm);
+    // An end beside the start, along the radius, is neither a small arc nor a full circle.
+    if programmed.sweep_rad.abs() * start_radius_mm < distance(arc.start_mm, arc.end_mm) / 2.0 {
+        return Err(end_off(start_radius_mm, end_radius_mm, columns));
+    }
     let middle = |geometry: &ArcGeometry, radius_mm: f64| {
         let centre = geometry.centre_mm;
         let start = (arc.start_mm[1] - centre[1]).atan2(arc.start_mm[0] - centre[0]);

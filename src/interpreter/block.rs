@@ -11,8 +11,8 @@ use super::value::Value;
 use super::wire::{Event, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::machine::{AccelerationMode, PathMode};
-use crate::program::syntax::{Address, AddressValue, Form, Target, Word, WordKind};
-use crate::program::words::{GFunction, Keyword, Role, role};
+use crate::program::syntax::{Address, AddressValue, Form, Target, Typed, Word, WordKind};
+use crate::program::words::{GFunction, Keyword};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 
 /// M6: the tool change comes before the motion of its block, at rest.
@@ -20,6 +20,12 @@ const TOOL_CHANGE: u32 = 6;
 /// M0, M1: stop. M2, M17, M30: end. They come after the motion of their block.
 const STOPS: [u32; 5] = [0, 1, 2, 17, 30];
 const ENDS: [u32; 3] = [2, 17, 30];
+/// Most circles that TURN adds.
+const TURNS_MAX: u32 = 999;
+/// Smallest F of the control, in the unit of F.
+pub(super) const FEED_MIN: f64 = 0.001;
+/// Longest wait of the control.
+const DWELL_MAX_S: f64 = 99999.999;
 
 /// What the words of a block come to.
 #[derive(Default)]
@@ -28,8 +34,8 @@ struct Collected {
     /// G groups seen, one bit each.
     groups: u64,
     addresses: Vec<Address>,
-    feed: Option<(f64, Columns)>,
-    spindle_speed: Option<(f64, Columns)>,
+    feed: Option<(Typed, Columns)>,
+    spindle_speed_rpm: Option<(f64, Columns)>,
     frame: Option<(Keyword, Columns)>,
     dwell: Option<Columns>,
     /// Output with the motion.
@@ -198,7 +204,7 @@ impl Interpreter {
             block.events.push(tool);
             return Ok(());
         }
-        let typed = number(&value.value, &self.variables)?;
+        let typed = Typed(number(&value.value, &self.variables)?);
         let plain = matches!(address, Address::Axis(_) | Address::Centre(_)) || value.form == Form::Modal;
         if !plain {
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "AC, IC and their kin are for axes")
@@ -213,20 +219,12 @@ impl Interpreter {
                     Some(AxisWord { typed, form: value.form, columns: columns.clone() });
             }
             Address::Radius => block.motion.radius = Some((typed, columns.clone())),
-            Address::Turn => block.motion.turns = whole(typed, columns, "TURN")?,
+            Address::Turn => block.motion.turns = turns(typed, columns)?,
             Address::Feed => block.feed = Some((typed, columns.clone())),
             Address::SpindleSpeed => {
-                if typed < 0.0 {
-                    return Err(Fault::new(
-                        codes::OUT_OF_RANGE,
-                        columns.clone(),
-                        format!("spindle speed {typed} rpm is below 0"),
-                    )
-                    .label("expected 0 or more")
-                    .help("M3 and M4 give the direction"));
-                }
-                block.spindle_speed = Some((typed, columns.clone()));
-                block.events.push(Event::SpindleSpeed { speed_rpm: typed });
+                let speed_rpm = spindle_speed_rpm(typed, columns)?;
+                block.spindle_speed_rpm = Some((speed_rpm, columns.clone()));
+                block.events.push(Event::SpindleSpeed { speed_rpm });
             }
             Address::Edge => block.events.push(Event::Edge(whole(typed, columns, "D")?)),
             Address::M => m_function(whole(typed, columns, "M")?, block),
@@ -236,38 +234,38 @@ impl Interpreter {
             }
             // A negative tolerance deletes it: the machine's holds again.
             Address::ContourTolerance => {
-                self.modal.contour_tolerance_mm = (typed >= 0.0).then(|| self.modal.length_mm(typed));
+                self.modal.contour_tolerance_mm = (typed.0 >= 0.0).then(|| self.modal.length_mm(typed));
             }
             Address::Tool => {}
         }
         Ok(())
     }
 
-    fn not_negative_mm(&self, typed: f64, columns: &Columns) -> Outcome<f64> {
-        if typed >= 0.0 {
+    fn not_negative_mm(&self, typed: Typed, columns: &Columns) -> Outcome<f64> {
+        if typed.0 >= 0.0 {
             return Ok(self.modal.length_mm(typed));
         }
-        Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("a rounding distance of {typed} is below 0"))
+        Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("a rounding distance of {} is below 0", typed.0))
             .label("expected 0 or more"))
     }
 
     fn tool(&self, value: &AddressValue) -> Outcome<Event> {
         let text = match evaluate(&value.value, &self.variables)? {
             Value::Text(text) => text,
-            number => whole(number.number(&value.value.columns)?, &value.value.columns, "T")?.to_string().into(),
+            number => whole(Typed(number.number(&value.value.columns)?), &value.value.columns, "T")?.to_string().into(),
         };
         Ok(Event::Tool(text))
     }
 
     fn take_feed(&mut self, block: &mut Collected) -> Outcome<()> {
         if let Some((typed, columns)) = block.feed.take() {
-            if typed <= 0.0 {
-                return Err(Fault::new(codes::BAD_FEED, columns, format!("feed {typed} is not above 0"))
-                    .label("expected more than 0"));
+            if typed.0 < FEED_MIN {
+                return Err(Fault::new(codes::BAD_FEED, columns, format!("feed {} is not possible", typed.0))
+                    .label(format!("expected {FEED_MIN} or more")));
             }
             self.modal.feed = Some(self.modal.programmed_feed(typed));
         }
-        if let Some((speed_rpm, _)) = block.spindle_speed {
+        if let Some((speed_rpm, _)) = block.spindle_speed_rpm {
             self.modal.spindle_speed_rpm = speed_rpm;
         }
         Ok(())
@@ -275,41 +273,39 @@ impl Interpreter {
 
     /// G4 F (seconds) or G4 S (revolutions): F and S of the path stay as they are.
     fn dwell(&mut self, block: &mut Collected, columns: &Columns) -> Outcome<()> {
-        if block.motion.any() {
-            return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "G4 and a motion in one block")
+        if block.motion.any() || block.frame.is_some() {
+            return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "G4 with a motion or a frame in one block")
                 .label("expected a block of its own"));
         }
-        let time_s = match (block.feed.take(), block.spindle_speed.take()) {
-            (Some((time_s, _)), None) if time_s >= 0.0 => time_s,
-            (Some((time_s, columns)), _) => {
-                return Err(Fault::new(codes::DWELL, columns, format!("a wait of {time_s} s"))
-                    .label("expected 0 or more, and not F and S together"));
-            }
-            (None, Some((revolutions, columns))) => {
-                if self.modal.spindle_speed_rpm <= 0.0 {
-                    return Err(Fault::new(
-                        codes::DWELL,
-                        columns,
-                        "G4 S counts revolutions, but no spindle speed is programmed",
-                    )
-                    .label("no S before this block"));
-                }
-                block.events.retain(|event| !matches!(event, Event::SpindleSpeed { .. }));
-                revolutions / self.modal.spindle_speed_rpm * S_PER_MIN
-            }
-            (None, None) => {
-                return Err(Fault::new(codes::DWELL, columns.clone(), "G4 without a time")
-                    .label("expected F with seconds or S with revolutions"));
-            }
-        };
-        let mut events = std::mem::take(&mut block.tool_events);
-        if !block.tool_change {
-            events = std::mem::take(&mut block.events);
-        } else {
-            events.append(&mut block.events);
+        let time_s = self.dwell_time_s(block, columns)?;
+        if !(0.0..=DWELL_MAX_S).contains(&time_s) {
+            return Err(Fault::new(codes::DWELL, columns.clone(), format!("a wait of {time_s} s is not possible"))
+                .label(format!("expected 0 to {DWELL_MAX_S} s")));
+        }
+        let mut events = std::mem::take(&mut block.events);
+        if block.tool_change {
+            events.splice(0..0, block.tool_events.drain(..));
         }
         self.emit(MoveKind::Dwell { time_s }, self.standing_feed(), false, events);
         Ok(())
+    }
+
+    fn dwell_time_s(&self, block: &mut Collected, columns: &Columns) -> Outcome<f64> {
+        let missing = |columns: &Columns, message: &str| {
+            Fault::new(codes::DWELL, columns.clone(), message).label("expected F with seconds or S with revolutions")
+        };
+        match (block.feed.take(), block.spindle_speed_rpm.take()) {
+            (Some((Typed(time_s), _)), None) => Ok(time_s),
+            (None, Some((_, columns))) if self.modal.spindle_speed_rpm <= 0.0 => {
+                Err(missing(&columns, "G4 S counts revolutions, but no spindle speed is programmed"))
+            }
+            (None, Some((revolutions, _))) => {
+                block.events.retain(|event| !matches!(event, Event::SpindleSpeed { .. }));
+                Ok(revolutions / self.modal.spindle_speed_rpm * S_PER_MIN)
+            }
+            (Some(_), Some((_, columns))) => Err(missing(&columns, "G4 with both F and S")),
+            (None, None) => Err(missing(columns, "G4 without a time")),
+        }
     }
 
     /// TRANS replaces the whole translation, ATRANS adds to it; axis words are offsets here.
@@ -349,17 +345,28 @@ fn m_function(number: u32, block: &mut Collected) {
     block.events.push(event);
 }
 
-fn whole(typed: f64, columns: &Columns, address: &str) -> Outcome<u32> {
-    whole_number(typed).ok_or_else(|| {
-        Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{address}{typed} is not possible"))
-            .label("expected a whole number from 0 to 2147483647")
-    })
+fn spindle_speed_rpm(typed: Typed, columns: &Columns) -> Outcome<f64> {
+    if typed.0 >= 0.0 {
+        return Ok(typed.0);
+    }
+    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("spindle speed {} rpm is below 0", typed.0))
+        .label("expected 0 or more")
+        .help("M3 and M4 give the direction"))
 }
 
-/// The entry of a word that is not acted on.
-pub(super) fn not_acted_on(word: &str) -> Option<&'static crate::program::NotActedOn> {
-    match role(word) {
-        Some(Role::NotActedOn(entry)) => Some(entry),
-        _ => None,
+/// TURN counts to 999 on the control.
+fn turns(typed: Typed, columns: &Columns) -> Outcome<u32> {
+    let turns = whole(typed, columns, "TURN=")?;
+    if turns <= TURNS_MAX {
+        return Ok(turns);
     }
+    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("TURN={turns} is too much"))
+        .label(format!("expected 0 to {TURNS_MAX}")))
+}
+
+fn whole(typed: Typed, columns: &Columns, address: &str) -> Outcome<u32> {
+    whole_number(typed.0).ok_or_else(|| {
+        Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{address}{} is not possible", typed.0))
+            .label("expected a whole number from 0 to 2147483647")
+    })
 }

@@ -14,6 +14,11 @@ use crate::program::syntax::{
 use crate::program::{Columns, Cursor, Fault, Outcome, block_number, codes, parse};
 use std::cmp::Ordering;
 
+/// Answers kept of searches for block numbers: computed targets may be without number.
+const FOUND_NUMBERS_MAX: usize = 4096;
+/// Lines that are searched in the time that a block takes.
+const SEARCHED_LINES_PER_BLOCK: u32 = 64;
+
 impl Interpreter {
     /// Executes a statement.
     pub(super) fn execute(&mut self, statement: &Statement) -> Outcome<()> {
@@ -176,31 +181,33 @@ impl Interpreter {
             .maybe_help(help)
     }
 
-    /// Searches a block number as the control does, and remembers what it found.
+    /// Searches a block number as the control does, and remembers the answer.
     fn find_number(&mut self, number: u64, direction: Direction) -> Option<Cursor> {
         let key = (self.current.line, direction, number);
-        if let Some(found) = self.found_numbers.get(&key) {
-            return Some(*found);
+        if let Some(known) = self.found_numbers.get(&key) {
+            return *known;
         }
+        let following = self.next;
         let found = match direction {
-            Direction::Forward => self.search_number(number, self.next, u32::MAX, true),
+            Direction::Forward => self.search_number(number, following, u32::MAX, true),
             Direction::Backward => self.search_number(number, self.source.first(), self.current.line, false),
-            _ => self
-                .search_number(number, self.next_in_text(), u32::MAX, true)
-                .or_else(|| self.search_number(number, self.source.first(), self.current.line, true)),
-        }?;
-        self.found_numbers.insert(key, found);
-        Some(found)
-    }
-
-    fn next_in_text(&self) -> Cursor {
-        self.source.line_bytes(self.current).map_or(self.current, |(_, next)| next)
+            _ => {
+                let forward = self.search_number(number, following, u32::MAX, true);
+                forward.or_else(|| self.search_number(number, self.source.first(), self.current.line, true))
+            }
+        };
+        if self.found_numbers.len() < FOUND_NUMBERS_MAX {
+            self.found_numbers.insert(key, found);
+        }
+        found
     }
 
     /// First or last line with the block number, from `cursor` up to and including `last_line`.
-    fn search_number(&self, number: u64, mut cursor: Cursor, last_line: u32, first: bool) -> Option<Cursor> {
+    fn search_number(&mut self, number: u64, mut cursor: Cursor, last_line: u32, first: bool) -> Option<Cursor> {
         let mut found = None;
+        let mut lines = 0;
         while let Some((line, next)) = self.source.line_bytes(cursor).filter(|_| cursor.line <= last_line) {
+            lines += 1;
             if number_of(line) == Some(number) {
                 found = Some(cursor);
                 if first {
@@ -209,6 +216,8 @@ impl Interpreter {
             }
             cursor = next;
         }
+        // Searching takes time too: a loop that searches without end must be found out.
+        self.idle_blocks = self.idle_blocks.saturating_add(lines / SEARCHED_LINES_PER_BLOCK);
         found
     }
 

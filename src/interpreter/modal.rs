@@ -7,6 +7,7 @@ use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
 use crate::base::{AxisKind, AxisVector};
 use crate::machine::{AccelerationMode, FeedSettings, PathMode};
+use crate::program::syntax::Typed;
 use crate::program::words::{Measure, Plane};
 
 /// G group 1.
@@ -95,24 +96,24 @@ impl Modal {
     }
 
     /// A typed position in internal units. G70 and G700: linear axes in inch; rotary axes always in degrees.
-    pub fn position_lu(&self, kind: AxisKind, typed: f64) -> f64 {
+    pub fn position_lu(&self, kind: AxisKind, typed: Typed) -> f64 {
         match (kind, self.measure) {
-            (AxisKind::Rotary, _) => rad_from_deg(typed),
-            (AxisKind::Linear, Measure::Metric) => typed,
-            (AxisKind::Linear, Measure::InchGeometry | Measure::Inch) => mm_from_inch(typed),
+            (AxisKind::Rotary, _) => rad_from_deg(typed.0),
+            (AxisKind::Linear, Measure::Metric) => typed.0,
+            (AxisKind::Linear, Measure::InchGeometry | Measure::Inch) => mm_from_inch(typed.0),
         }
     }
 
     /// A typed length that is no position (CTOL, ADIS): inch with G700 only.
-    pub fn length_mm(&self, typed: f64) -> f64 {
-        if self.measure == Measure::Inch { mm_from_inch(typed) } else { typed }
+    pub fn length_mm(&self, typed: Typed) -> f64 {
+        if self.measure == Measure::Inch { mm_from_inch(typed.0) } else { typed.0 }
     }
 
     /// A typed feed: mm/min (inch/min with G700), and deg/min where only rotary axes move.
-    pub fn programmed_feed(&self, typed: f64) -> ProgrammedFeed {
+    pub fn programmed_feed(&self, typed: Typed) -> ProgrammedFeed {
         ProgrammedFeed {
             linear_mm_s: mm_s_from_mm_min(self.length_mm(typed)),
-            rotary_rad_s: rad_from_deg(typed) / S_PER_MIN,
+            rotary_rad_s: rad_from_deg(typed.0) / S_PER_MIN,
         }
     }
 }

@@ -4,7 +4,7 @@
 //! translations only. Checks travel at programmed end points (a warning: the control would stop with alarm 10720).
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
-use super::block::not_acted_on;
+use super::block::FEED_MIN;
 use super::modal::Motion;
 use super::run::Interpreter;
 use super::value::trimmed;
@@ -12,19 +12,22 @@ use super::wire::{ArcGeometry, Event, Feed, MoveKind};
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
 use crate::program::plain::PlainBlock;
-use crate::program::syntax::Form;
+use crate::program::syntax::{Form, Typed};
 use crate::program::words::Plane;
-use crate::program::{Columns, Fault, Outcome, codes};
+use crate::program::{Columns, Fault, NotActedOn, Outcome, codes};
 use std::f64::consts::{PI, TAU};
 
 /// Angles nearer than this are the same for DC, ACP and ACN: below any digit that a program carries.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
+/// Largest position, centre and radius (mm, rad): ten kilometres. Beyond it a typing error is certain, and squares would lose digits.
+const LENGTH_MAX_LU: f64 = 1e7;
+
 /// An axis word (or I, J, K) as typed.
 #[derive(Clone, Debug)]
 pub(super) struct AxisWord {
     /// mm, inch or degrees.
-    pub typed: f64,
+    pub typed: Typed,
     /// AC, IC, ...
     pub form: Form,
     /// Marked bytes.
@@ -39,7 +42,7 @@ pub(super) struct MotionWords {
     /// I, J, K.
     pub centre: [Option<AxisWord>; 3],
     /// CR.
-    pub radius: Option<(f64, Columns)>,
+    pub radius: Option<(Typed, Columns)>,
     /// TURN.
     pub turns: u32,
     /// G9.
@@ -120,7 +123,7 @@ impl Interpreter {
             None => self.modal.motion,
         };
         let feed = match block.feed {
-            Some(typed) if typed > 0.0 => Some(self.modal.programmed_feed(typed)),
+            Some(typed) if typed.0 >= FEED_MIN => Some(self.modal.programmed_feed(typed)),
             Some(_) => return false,
             None => self.modal.feed,
         };
@@ -138,11 +141,11 @@ impl Interpreter {
             } else {
                 end.0[id] + value_lu + offset_lu - self.applied_lu[id]
             };
-            if outside(axis.travel_lu, end.0[id]).is_some() {
+            if outside(axis.travel_lu, end.0[id]).is_some() || end.0[id].abs() > LENGTH_MAX_LU {
                 return false;
             }
         }
-        if end != start && !straight {
+        if !straight {
             return false;
         }
         for id in machine.axis_ids() {
@@ -182,7 +185,7 @@ impl Interpreter {
         let mut end = self.position;
         for id in self.machine.axis_ids() {
             if let Some(word) = &words.axes[id] {
-                end.0[id] = self.axis_end(id, word, words.suppress_frames)?;
+                end.0[id] = bounded(self.axis_end(id, word, words.suppress_frames)?, &word.columns)?;
             }
         }
         Ok(end)
@@ -241,12 +244,10 @@ impl Interpreter {
         let start_mm = plane.map(|id| self.position.0[id]);
         let end_mm = plane.map(|id| end.0[id]);
         let across = 3 - indices[0] - indices[1];
-        if let Some(word) = &words.centre[across] {
-            if word.typed != 0.0
-                && let Some(entry) = not_acted_on("KIJ")
-            {
-                self.report_word(entry, &word.columns);
-            }
+        if let Some(word) = words.centre[across].as_ref().filter(|word| word.typed.0 != 0.0)
+            && let Some(entry) = NotActedOn::find("I/J/K")
+        {
+            self.report_word(entry, &word.columns);
         }
         let in_plane = indices.map(|index| words.centre[index].as_ref());
         let has_centre = in_plane.iter().any(Option::is_some);
@@ -255,13 +256,17 @@ impl Interpreter {
                 return Err(Fault::new(codes::BAD_BLOCK, radius_columns.clone(), "centre and radius in one block")
                     .label("expected one of the two"));
             }
-            Some((typed, _)) => ArcShape::Radius { radius_mm: self.modal.position_lu(AxisKind::Linear, *typed) },
+            Some((typed, radius_columns)) => ArcShape::Radius {
+                radius_mm: bounded(self.modal.position_lu(AxisKind::Linear, *typed), radius_columns)?,
+            },
             None if has_centre => {
-                let centre = |k: usize| {
-                    in_plane[k]
-                        .map_or(start_mm[k], |word| self.centre(word, plane[k], start_mm[k], words.suppress_frames))
+                let centre = |k: usize| match in_plane[k] {
+                    Some(word) => {
+                        bounded(self.centre(word, plane[k], start_mm[k], words.suppress_frames), &word.columns)
+                    }
+                    None => Ok(start_mm[k]),
                 };
-                ArcShape::Centre { centre_mm: [centre(0), centre(1)] }
+                ArcShape::Centre { centre_mm: [centre(0)?, centre(1)?] }
             }
             None => {
                 return Err(Fault::new(
@@ -327,9 +332,18 @@ impl Interpreter {
             let fault = Fault::new(codes::TRAVEL, word.columns.clone(), message)
                 .label("outside the travel")
                 .help("the control would raise alarm 10720; the simulation goes on, and further positions of this axis are not reported");
-            self.warn(fault);
+            self.warn(*fault);
         }
     }
+}
+
+/// A length or angle that can be calculated with.
+fn bounded(value_lu: f64, columns: &Columns) -> Outcome<f64> {
+    if value_lu.abs() <= LENGTH_MAX_LU {
+        return Ok(value_lu);
+    }
+    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), "this value is too large for an axis")
+        .label("expected at most 1EX7"))
 }
 
 /// The limit that a position violates, and by how much.
@@ -338,7 +352,7 @@ fn outside(travel_lu: Option<[f64; 2]>, position_lu: f64) -> Option<(f64, f64)> 
     if position_lu < low_lu {
         return Some((low_lu, low_lu - position_lu));
     }
-    (position_lu > high_lu).then(|| (high_lu, position_lu - high_lu))
+    (position_lu > high_lu).then_some((high_lu, position_lu - high_lu))
 }
 
 /// Way of an endless axis to a position `difference_rad` away.

@@ -18,9 +18,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 /// Blocks without a move after which a loop counts as endless: well under two seconds.
-const IDLE_BLOCKS_MAX: u32 = 2_000_000;
+const IDLE_BLOCKS_MAX: u32 = 1_000_000;
 /// Parsed blocks kept for loops.
 const KEPT_BLOCKS_MAX: usize = 4096;
+/// Longest line of which the parsed block is kept: memory stays bounded.
+const KEPT_LINE_BYTES_MAX: usize = 512;
 
 /// A program in execution. A clone goes on independently from the same state.
 #[derive(Clone, Debug)]
@@ -46,13 +48,13 @@ pub struct Interpreter {
     /// Moves of the block in execution.
     pub(super) queue: VecDeque<Move>,
     /// Block numbers that jumps have found, by line and direction of the jump.
-    pub(super) found_numbers: BTreeMap<(u32, Direction, u64), Cursor>,
+    pub(super) found_numbers: BTreeMap<(u32, Direction, u64), Option<Cursor>>,
     warnings: Vec<Diagnostic>,
     warned: BTreeSet<&'static str>,
     pub(super) travel_warned: PerAxis<bool>,
     opened: Option<Event>,
     state: State,
-    idle_blocks: u32,
+    pub(super) idle_blocks: u32,
     kept_blocks: BTreeMap<u32, Arc<Block>>,
     furthest_line: u32,
 }
@@ -170,7 +172,8 @@ impl Interpreter {
             return Ok(kept.clone());
         }
         let block = Arc::new(parse(&self.source.decode(bytes), &self.dialect)?);
-        if line <= self.furthest_line && self.kept_blocks.len() < KEPT_BLOCKS_MAX {
+        let is_short = bytes.len() <= KEPT_LINE_BYTES_MAX;
+        if line <= self.furthest_line && is_short && self.kept_blocks.len() < KEPT_BLOCKS_MAX {
             self.kept_blocks.insert(line, block.clone());
         }
         self.furthest_line = self.furthest_line.max(line);
@@ -206,13 +209,13 @@ impl Interpreter {
                 format!("`{}` is not acted on: {}", entry.word, entry.consequence),
             )
             .label("known, but not acted on");
-            self.warn(fault);
+            self.warn(*fault);
         }
     }
 
     /// Puts a finding on the list of warnings.
-    pub(super) fn warn(&mut self, fault: Box<Fault>) {
-        let mut diagnostic = self.diagnostic(*fault);
+    pub(super) fn warn(&mut self, fault: Fault) {
+        let mut diagnostic = self.diagnostic(fault);
         diagnostic.severity = crate::base::Severity::Warning;
         self.warnings.push(diagnostic);
     }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// Highest R parameter (MD28050 allows 32535 of them).
 pub const R_MAX: i32 = 32534;
 /// Elements of all variables together.
-const ELEMENTS_MAX: usize = 1_000_000;
+const ELEMENTS_MAX: usize = 100_000;
 
 /// All variables.
 #[derive(Clone, Debug, Default)]

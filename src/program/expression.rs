@@ -154,7 +154,7 @@ impl ExprParser<'_, '_> {
             .label("not built yet"));
         }
         match role {
-            None => {
+            None | Some(Role::FunctionNotBuilt(_)) => {
                 let indices = self.indices()?;
                 Ok(ExprKind::Variable { name: name.to_ascii_uppercase().into(), indices })
             }
@@ -211,7 +211,7 @@ impl ExprParser<'_, '_> {
             return Ok(ExprKind::Int(0));
         }
         match role {
-            Some(Role::NotBuilt(reason)) => Err(not_built(name, reason, columns)),
+            Some(Role::NotBuilt(reason) | Role::FunctionNotBuilt(reason)) => Err(not_built(name, reason, columns)),
             _ if name.starts_with('$') => {
                 Err(Fault::new(codes::NOT_BUILT, columns, format!("`{name}` cannot be read yet"))
                     .label("not built yet"))

@@ -93,6 +93,12 @@ impl<'a> Lexer<'a> {
         self.peek_byte().is_some_and(|byte| byte.is_ascii_digit())
     }
 
+    /// True if the byte just before is a digit or a point: what follows was perhaps meant to belong to the number.
+    pub fn is_behind_digit(&self) -> bool {
+        let before = self.at.checked_sub(1).and_then(|at| self.text.as_bytes().get(at));
+        before.is_some_and(|byte| byte.is_ascii_digit() || *byte == b'.')
+    }
+
     /// Takes one byte that the caller has seen.
     pub fn skip_byte(&mut self) {
         self.at += 1;

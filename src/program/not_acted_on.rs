@@ -12,6 +12,13 @@ pub struct NotActedOn {
     pub consequence: &'static str,
 }
 
+impl NotActedOn {
+    /// The entry of a word, spelled as in the table.
+    pub fn find(word: &str) -> Option<&'static Self> {
+        NOT_ACTED_ON.iter().find(|entry| entry.word == word)
+    }
+}
+
 const fn entry(word: &'static str, consequence: &'static str) -> NotActedOn {
     NotActedOn { word, consequence }
 }
@@ -135,7 +142,7 @@ pub static NOT_ACTED_ON: &[NotActedOn] = &[
     entry("Sn=", "the speed of a spindle other than spindle 1 is not recorded"),
     entry("Mn=", "an M function of a spindle other than spindle 1 is not recorded"),
     entry("H", "H functions are not recorded"),
-    entry("KIJ", "I, J or K of the axis across the plane has no effect on a circle"),
+    entry("I/J/K", "I, J or K of the axis across the plane has no effect on a circle"),
     entry("CPRECON", "the path velocity is not lowered for contour accuracy"),
     entry("STARTFIFO", "the look-ahead is filled as it always is"),
     entry("STOPFIFO", "the look-ahead is filled as it always is"),

@@ -8,7 +8,7 @@ use super::codes::{self, Columns, Fault, Outcome};
 use super::dialect::Dialect;
 use super::expression::{arguments, expected, expression, indices, not_built, unused_expression};
 use super::lexer::{Lexer, Number, Token};
-use super::statements::statement;
+use super::statements::{initial, statement};
 use super::syntax::{
     Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, Initial, Statement, Target, Word, WordKind,
 };
@@ -53,6 +53,9 @@ pub fn parse(text: &str, dialect: &Dialect) -> Outcome<Block> {
     block.statement = Statement::Words(block_words(&mut lexer, dialect)?);
     Ok(block)
 }
+
+/// Letters that are addresses on every machine; N only at the start of the block, which is said where it is read.
+const ADDRESS_LETTERS: &[u8] = b"DFGHIJKLMNPRST";
 
 /// Words that open a synchronised action: the rest of the line belongs to it.
 const SYNCHRONISED: [&str; 7] = ["ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO"];
@@ -119,7 +122,8 @@ fn block_words(lexer: &mut Lexer, dialect: &Dialect) -> Outcome<Vec<Word>> {
     let mut found = Vec::new();
     while !lexer.at_end() {
         let start = lexer.position();
-        let kind = WordParser { lexer, dialect, start, first: found.is_empty() }.word()?;
+        let behind_digit = lexer.is_behind_digit();
+        let kind = WordParser { lexer, dialect, start, first: found.is_empty(), behind_digit }.word()?;
         found.push(Word { columns: lexer.columns_from(start), kind });
     }
     Ok(found)
@@ -131,14 +135,17 @@ struct WordParser<'l, 'a, 'd> {
     dialect: &'d Dialect,
     start: usize,
     first: bool,
+    /// The byte before it is a digit or a point.
+    behind_digit: bool,
 }
 
 impl<'a> WordParser<'_, 'a, '_> {
     fn word(&mut self) -> Outcome<WordKind> {
         let Some(name) = self.lexer.name() else {
             let mut ahead = *self.lexer;
-            ahead.token()?;
-            return Err(expected(self.lexer, "a word such as G1 or X10"));
+            let is_comma = ahead.token()? == Token::Symbol(",");
+            let help = (is_comma && self.behind_digit).then(|| "the decimal sign is a point".to_owned());
+            return Err(expected(self.lexer, "a word such as G1 or X10").maybe_help(help));
         };
         match name.as_bytes() {
             [b'$', ..] => self.system_variable(name),
@@ -168,6 +175,7 @@ impl<'a> WordParser<'_, 'a, '_> {
             let columns = self.columns();
             return Err(not_built(&format!("{name}[...]"), "indexed addresses are not built yet", columns));
         }
+        self.check_letter(letter)?;
         let value = if self.lexer.take("=") { self.address_value()? } else { self.plain_number(letter)? };
         self.address(letter, value)
     }
@@ -189,8 +197,23 @@ impl<'a> WordParser<'_, 'a, '_> {
             )
             .label("expected `=` and a value"));
         }
+        self.check_letter(letter)?;
         let value = self.plain_number(letter)?;
         self.address(letter, value)
+    }
+
+    /// A letter that is no address is the error, not what stands behind it: `X1O` has an O for a 0.
+    fn check_letter(&self, letter: u8) -> Outcome<()> {
+        let letter = letter.to_ascii_uppercase();
+        if ADDRESS_LETTERS.contains(&letter) || self.dialect.letter(letter).is_some() {
+            return Ok(());
+        }
+        let columns = self.start as u32..self.start as u32 + 1;
+        let mut fault = self.unknown_axis(&char::from(letter).to_string(), columns);
+        if letter == b'O' && self.behind_digit {
+            fault.help = Some("did you mean the digit 0?".to_owned());
+        }
+        Err(fault)
     }
 
     /// `X1=`, `S2=`, `R5=`: letter and number, then an equals sign.
@@ -390,7 +413,6 @@ impl<'a> WordParser<'_, 'a, '_> {
                 Ok(WordKind::Silent)
             }
             Some(Role::NotActedOn(entry)) => self.pass_over(entry),
-            Some(Role::NotBuilt(reason)) => Err(not_built(name, reason, columns)),
             Some(Role::Control(_)) => {
                 Err(Fault::new(codes::BAD_BLOCK, columns, format!("`{name}` must be the first word of its block"))
                     .label("not here")
@@ -400,10 +422,11 @@ impl<'a> WordParser<'_, 'a, '_> {
                 Err(Fault::new(codes::BAD_BLOCK, columns, format!("`{name}` cannot begin a word"))
                     .label("expected an address or a word"))
             }
-            None if matches!(next, Token::Symbol("=" | "[")) => {
+            None | Some(Role::FunctionNotBuilt(_)) if matches!(next, Token::Symbol("=" | "[")) => {
                 let indices = indices(self.lexer)?;
                 self.assignment(Target::Variable { name: name.to_ascii_uppercase().into(), indices })
             }
+            Some(Role::NotBuilt(reason) | Role::FunctionNotBuilt(reason)) => Err(not_built(name, reason, columns)),
             None => Err(self.unknown_word(name, columns)),
         }
     }
@@ -451,36 +474,11 @@ impl<'a> WordParser<'_, 'a, '_> {
     }
 }
 
-/// A value, SET(...) or REP(...).
-pub(super) fn initial(lexer: &mut Lexer) -> Outcome<Initial> {
-    let mut ahead = *lexer;
-    let name = ahead.name().unwrap_or_default();
-    let (is_set, is_rep) = (name.eq_ignore_ascii_case("SET"), name.eq_ignore_ascii_case("REP"));
-    if !(is_set || is_rep) || !ahead.take("(") {
-        return Ok(Initial::One(expression(lexer)?));
-    }
-    let start = lexer.position();
-    *lexer = ahead;
-    let mut values = arguments(lexer, ")", false)?;
-    if is_set {
-        return Ok(Initial::Set(values));
-    }
-    let count = if values.len() == 2 { values.pop().flatten() } else { None };
-    match (values.pop().flatten(), values.is_empty()) {
-        (Some(value), true) => Ok(Initial::Repeat(value, count)),
-        _ => Err(Fault::new(codes::EXPECTED_VALUE, lexer.columns_from(start), "REP takes a value and how often")
-            .label("expected REP(value, count)")),
-    }
-}
-
 fn not_acted_on(word: &str) -> Outcome<WordKind> {
-    match words::role(word) {
-        Some(Role::NotActedOn(entry)) => Ok(WordKind::NotActedOn(entry)),
-        _ => Ok(WordKind::Silent),
-    }
+    Ok(NotActedOn::find(word).map_or(WordKind::Silent, WordKind::NotActedOn))
 }
 
 /// The whole number of an address such as M or T, if the value is one and not negative.
 pub fn whole_number(value: f64) -> Option<u32> {
-    (value >= 0.0 && value <= INTEGER_MAX && value.fract() == 0.0).then_some(value as u32)
+    ((0.0..=INTEGER_MAX).contains(&value) && value.fract() == 0.0).then_some(value as u32)
 }

@@ -1,9 +1,10 @@
 //! The fast path for what a CAM program is made of: `N10 G1 X1.5 Y-.2 Z3. F2000`.
 //!
-//! In: bytes of a line. Out: [`PlainBlock`], or `None` for every line that holds anything else: the parser then reads it. What is
+//! In: bytes of a line, with or without a comment. Out: [`PlainBlock`], or `None` for every line that holds anything else: the parser then reads it. What is
 //! accepted here means the same as there (a test compares both on random lines). No allocation.
 
 use super::dialect::Dialect;
+use super::syntax::Typed;
 use crate::base::{AxisId, PerAxis};
 
 /// A block of G0 or G1, axis words with plain numbers, and F.
@@ -12,9 +13,9 @@ pub struct PlainBlock {
     /// G0 (true) or G1 (false), if there is one.
     pub rapid: Option<bool>,
     /// Values of axis words, as typed.
-    pub axes: PerAxis<Option<f64>>,
+    pub axes: PerAxis<Option<Typed>>,
     /// F word, as typed.
-    pub feed: Option<f64>,
+    pub feed: Option<Typed>,
 }
 
 /// Decimal places up to which a quotient of two exact integers is correctly rounded: 10^22 and 2^53 are exact.
@@ -40,6 +41,7 @@ pub fn plain_block(line: &[u8], dialect: &Dialect) -> Option<PlainBlock> {
         let Some(letter) = line.get(at) else { return any.then_some(block) };
         at += 1;
         match letter {
+            b';' => return any.then_some(block),
             b'G' | b'g' => {
                 let start = at;
                 at = digits(line, at);
@@ -91,11 +93,11 @@ fn ends_badly(line: &[u8], at: usize) -> bool {
         // `X1 =` is an extended address; `X1EX3` has an exponent.
         Some(b' ' | b'\t') => line.get(blanks(line, at)) == Some(&b'='),
         Some(b'E' | b'e') => line.get(at + 1).is_some_and(|byte| byte.eq_ignore_ascii_case(&b'X')),
-        Some(byte) => !byte.is_ascii_alphabetic(),
+        Some(byte) => !(byte.is_ascii_alphabetic() || *byte == b';'),
     }
 }
 
-fn number(line: &[u8], at: &mut usize) -> Option<f64> {
+fn number(line: &[u8], at: &mut usize) -> Option<Typed> {
     let negative = line.get(*at) == Some(&b'-');
     if negative || line.get(*at) == Some(&b'+') {
         *at += 1;
@@ -124,5 +126,5 @@ fn number(line: &[u8], at: &mut usize) -> Option<f64> {
     }
     let value = mantissa as f64 / POWERS[places];
     // A negative zero becomes zero, as the parser has it.
-    Some(if negative { 0.0 - value } else { value })
+    Some(Typed(if negative { 0.0 - value } else { value }))
 }

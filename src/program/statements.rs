@@ -4,9 +4,8 @@
 //! Partners (IF and its ENDIF) are found by `structure`, not here.
 
 use super::codes::{self, Columns, Fault, Outcome};
-use super::expression::{expected, expression, indices, not_built};
+use super::expression::{arguments, expected, expression, indices, not_built};
 use super::lexer::{Lexer, Number, Token};
-use super::parser::initial;
 use super::syntax::{
     Case, DefinedVariable, Definition, Destination, Direction, Expr, ExprKind, ForLoop, Initial, Jump, Statement,
     Target, VariableType,
@@ -192,6 +191,28 @@ fn defined_variable(lexer: &mut Lexer) -> Outcome<DefinedVariable> {
     Ok(DefinedVariable { name: Arc::from(name.to_ascii_uppercase()), columns, dimensions, initial })
 }
 
+/// A value, SET(...) or REP(...).
+pub(super) fn initial(lexer: &mut Lexer) -> Outcome<Initial> {
+    let mut ahead = *lexer;
+    let name = ahead.name().unwrap_or_default();
+    let (is_set, is_rep) = (name.eq_ignore_ascii_case("SET"), name.eq_ignore_ascii_case("REP"));
+    if !(is_set || is_rep) || !ahead.take("(") {
+        return Ok(Initial::One(expression(lexer)?));
+    }
+    let start = lexer.position();
+    *lexer = ahead;
+    let mut values = arguments(lexer, ")", false)?;
+    if is_set {
+        return Ok(Initial::Set(values));
+    }
+    let count = if values.len() == 2 { values.pop().flatten() } else { None };
+    match (values.pop().flatten(), values.is_empty()) {
+        (Some(value), true) => Ok(Initial::Repeat(value, count)),
+        _ => Err(Fault::new(codes::EXPECTED_VALUE, lexer.columns_from(start), "REP takes a value and how often")
+            .label("expected REP(value, count)")),
+    }
+}
+
 /// Names of variables begin with two letters or underscores and are not words of the language.
 fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
     let letter = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';
@@ -209,7 +230,7 @@ fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
         .label("expected two letters or underscores at its start")
         .maybe_help(name.starts_with(['R', 'r']).then(|| "R parameters need no DEF".to_owned())));
     }
-    if name.len() == 1 || words::role(name).is_some() {
+    if name.len() == 1 || !matches!(words::role(name), None | Some(Role::FunctionNotBuilt(_))) {
         return Err(Fault::new(codes::REDECLARED, columns.clone(), format!("`{name}` is a word of the language"))
             .label("expected a name of its own"));
     }

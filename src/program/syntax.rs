@@ -292,6 +292,11 @@ pub enum Target {
     },
 }
 
+/// A number as it stands in the program, in the unit that its address and G70/G700 give it: mm, inch, degrees, mm/min and so on.
+/// Only the interpreter makes a quantity of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Typed(pub f64);
+
 /// An expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expr {

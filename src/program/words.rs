@@ -4,7 +4,7 @@
 //! here, known but not acted on ([`NOT_ACTED_ON`], a warning once a run), or not built yet (an error that says so).
 
 pub use super::not_acted_on::{NOT_ACTED_ON, NotActedOn};
-use super::not_built::NOT_BUILT;
+use super::not_built::{FUNCTIONS_NOT_BUILT, NOT_BUILT};
 use super::syntax::{Address, Direction};
 use crate::machine::PathMode;
 use std::sync::OnceLock;
@@ -30,6 +30,8 @@ pub enum Role {
     NotActedOn(&'static NotActedOn),
     /// Known, an error with this reason.
     NotBuilt(&'static str),
+    /// A function that is known and not built: an error where it is called, a free name where it is not.
+    FunctionNotBuilt(&'static str),
 }
 
 /// Words that stand alone and are acted on.
@@ -262,7 +264,9 @@ pub fn known_words() -> impl Iterator<Item = &'static str> + Clone {
 
 /// Help with the nearest known word, if one is near.
 pub fn did_you_mean(word: &str) -> Option<String> {
-    crate::base::diagnostics::nearest(word, known_words()).map(|near| format!("did you mean `{near}`?"))
+    // Some entries stand for a whole family (`Sn=`, `$TC_`): nobody writes them.
+    let written = known_words().filter(|known| known.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_'));
+    crate::base::diagnostics::nearest(word, written).map(|near| format!("did you mean `{near}`?"))
 }
 
 fn table() -> &'static [(&'static str, Role)] {
@@ -272,6 +276,9 @@ fn table() -> &'static [(&'static str, Role)] {
         table.extend(SYNTAX.iter().map(|word| (*word, Role::Syntax)));
         table.extend(SILENT.iter().map(|word| (*word, Role::Silent)));
         table.extend(NOT_ACTED_ON.iter().map(|entry| (entry.word, Role::NotActedOn(entry))));
+        table.extend(
+            FUNCTIONS_NOT_BUILT.iter().map(|word| (*word, Role::FunctionNotBuilt("this function is not built yet"))),
+        );
         table.extend(
             NOT_BUILT.iter().flat_map(|(words, reason)| words.iter().map(|word| (*word, Role::NotBuilt(reason)))),
         );
