@@ -69,7 +69,8 @@ fn shortened(findings: &[Diagnostic]) -> Vec<Diagnostic> {
             shown.push(finding.clone());
         } else if *number == SAME_SHOWN_MAX {
             let more = total - SAME_SHOWN_MAX;
-            let note = format!("and the same {}", if more == 1 { "once more".into() } else { format!("{more} times more") });
+            let note =
+                format!("and the same {}", if more == 1 { "once more".into() } else { format!("{more} times more") });
             let help = finding.help.as_ref().map_or(note.clone(), |help| format!("{help}; {note}"));
             shown.push(finding.clone().help(help));
         }

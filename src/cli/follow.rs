@@ -98,7 +98,10 @@ fn read_setpoints(path: &Path, machine: &Loaded) -> Result<SetpointTable, Failur
     let bytes = std::fs::read(path)
         .map_err(|error| Failure::unreadable(Diagnostic::error("F0009", format!("cannot read `{name}`: {error}"))))?;
     let text = String::from_utf8(bytes).map_err(|_| {
-        Failure::unreadable(Diagnostic::error("F0010", format!("`{name}` is not UTF-8 text")).help("save the CSV as UTF-8"))
+        Failure::unreadable(
+            Diagnostic::error("F0010", format!("`{name}` is not UTF-8 text")).help("save the CSV as UTF-8"),
+        )
     })?;
-    SetpointTable::from_csv(&SourceText::new(name, text), &machine.machine).map_err(|finding| Failure::found_wrong(vec![finding]))
+    SetpointTable::from_csv(&SourceText::new(name, text), &machine.machine)
+        .map_err(|finding| Failure::found_wrong(vec![finding]))
 }

@@ -63,10 +63,7 @@ pub(super) fn open_program(path: &Path) -> Result<ProgramSource, Failure> {
 }
 
 /// An output must not be an input: opening it would destroy what is to be read.
-pub(super) fn refuse_same_file<'a>(
-    inputs: impl IntoIterator<Item = &'a Path>,
-    output: &Path,
-) -> Result<(), Failure> {
+pub(super) fn refuse_same_file<'a>(inputs: impl IntoIterator<Item = &'a Path>, output: &Path) -> Result<(), Failure> {
     if inputs.into_iter().any(|input| is_same_file(input, output)) {
         let finding = Diagnostic::error("C0001", format!("`{}` is both input and output", output.display()));
         return Err(Failure::unreadable(finding.help("give another name to -o")));

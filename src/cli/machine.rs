@@ -59,9 +59,10 @@ impl MachineArguments {
     /// Whether a JSON document is wanted.
     pub(super) fn json(&self) -> bool {
         match &self.action {
-            Action::Check { json, .. } | Action::Schema { json } | Action::List { json } | Action::Show { json, .. } => {
-                *json
-            }
+            Action::Check { json, .. }
+            | Action::Schema { json }
+            | Action::List { json }
+            | Action::Show { json, .. } => *json,
         }
     }
 }
@@ -86,11 +87,7 @@ fn check(name: &str, sets: &[String], json: bool) -> Result<(), Failure> {
     match load(name, sets) {
         Ok(loaded) => {
             show(&loaded.warnings);
-            if json {
-                print_json(&verdict(name, &[], &loaded.warnings))
-            } else {
-                print(&overview(&loaded))
-            }
+            if json { print_json(&verdict(name, &[], &loaded.warnings)) } else { print(&overview(&loaded)) }
         }
         Err(LoadError::Invalid(findings)) => {
             show(&findings);

@@ -69,8 +69,8 @@ const OUT_OF_RANGE: &[(&str, &str, &[&str])] = &[
         "position_gain_per_s = 0.0",
         &["position_gain_per_s = 0.0 1/s", "greater than 0 1/s"],
     ),
-    ("setpoint_delay_ms = 1.2", "setpoint_delay_ms = -1", &["setpoint_delay_ms = -1 ms", "0 ms or more"]),
-    ("setpoint_delay_ms = 1.2", "setpoint_delay_ms = inf", &["setpoint_delay_ms = inf ms", "0 ms or more"]),
+    ("setpoint_delay_ms = 1.2", "setpoint_delay_ms = -1", &["setpoint_delay_ms = -1 ms", "0 ms to 1000 ms"]),
+    ("setpoint_delay_ms = 1.2", "setpoint_delay_ms = inf", &["setpoint_delay_ms = inf ms", "0 ms to 1000 ms"]),
     ("current_max_a = 28.0", "current_max_a = 0", &["current_max_a = 0 A", "or inf"]),
     (
         "speed_reset_time_ms = 10.0",
