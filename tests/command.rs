@@ -62,6 +62,18 @@ fn json_is_one_document_whatever_is_wrong_with_the_input() {
 }
 
 #[test]
+fn shipped_programs_and_machines_work_in_an_empty_folder() {
+    let folder = folder("command_shipped");
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("programs")).expect("programs") {
+        let name = entry.expect("a file").file_name().to_string_lossy().into_owned();
+        if name.ends_with(".mpf") {
+            let output = sollwert(&folder, &["check", &name, "-m", "xyzbc", "--json"]);
+            assert_ne!(output.status.code(), Some(2), "{name}: {}", errors_of(&output));
+        }
+    }
+}
+
+#[test]
 fn moves_say_in_json_what_ended_them() {
     let folder = folder("command_moves");
     fs::write(folder.join("wrong.mpf"), "G1 X1 F100\nG1 X=(2\n").expect("a program");

@@ -57,8 +57,23 @@ pub(super) fn refused(error: LoadError) -> Failure {
     }
 }
 
-/// Opens a program.
+/// The shipped programs; inside the binary, so that an installed `sollwert` works in an empty folder.
+pub(super) const SHIPPED_PROGRAMS: &[(&str, &str)] = &[
+    ("circle.mpf", include_str!("../../programs/circle.mpf")),
+    ("corners.mpf", include_str!("../../programs/corners.mpf")),
+    ("pocket.mpf", include_str!("../../programs/pocket.mpf")),
+    ("spline.mpf", include_str!("../../programs/spline.mpf")),
+];
+
+/// Opens a program, or a shipped one by its name where no file of that name exists.
 pub(super) fn open_program(path: &Path) -> Result<ProgramSource, Failure> {
+    if !path.exists()
+        && let Some((name, text)) = SHIPPED_PROGRAMS
+            .iter()
+            .find(|(name, _)| Path::new(name) == path || path == Path::new(name).with_extension(""))
+    {
+        return Ok(ProgramSource::from_bytes(name, text.as_bytes()));
+    }
     ProgramSource::from_file(path).map_err(Failure::unreadable)
 }
 
