@@ -6,8 +6,11 @@
 mod closed_forms;
 mod contour;
 mod corners;
+mod drives;
 mod figures;
 mod limits;
+mod recording;
 mod replay;
 mod text;
+mod trace;
 mod window;
