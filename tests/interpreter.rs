@@ -419,6 +419,27 @@ fn words_not_acted_on_are_reported_once() {
 }
 
 #[test]
+fn a_tool_without_data_is_reported_once() {
+    let cases = [
+        ("G0 X1\nT=\"MILL_D8\" M6\nT5 D2 M6\nD1", 2, "tool `MILL_D8`", 0..11),
+        ("G0 X1 T12\nM6\nT12", 1, "tool `12`", 6..9),
+        ("T0 D0\nM6\nG0 X1 D2\nT=\"MILL\" M6", 3, "edge `D2`", 6..8),
+        ("DEF STRING[8] NAME=\"DRILL\"\nT=NAME", 2, "tool `DRILL`", 0..6),
+    ];
+    for (text, line, name, columns) in cases {
+        let result = run(text);
+        assert!(result.alarm.is_none(), "{text}: {}", result.alarm().render(false));
+        let [warning] = &result.warnings[..] else { panic!("{text}: {:?}", result.warnings) };
+        assert_eq!((warning.code, warning.line()), ("W0004", line), "{text}");
+        assert_eq!(warning.place.as_ref().unwrap().columns, columns, "{text}");
+        assert!(warning.message.starts_with(&format!("{name} has no data: length and radius")), "{}", warning.message);
+    }
+    for text in ["T0 M6\nD0\nG0 X1", "M6\nG0 X1", "T=\"0\" D=0 M6"] {
+        assert_eq!(run(text).warnings, [], "{text}: no tool, nothing to miss");
+    }
+}
+
+#[test]
 fn words_that_would_change_the_motion_are_errors() {
     for text in [
         "TRAORI",

@@ -53,7 +53,10 @@ fn listings_are_golden() {
 fn shipped_programs_are_clean_and_end_at_rest() {
     for name in names() {
         let source = ProgramSource::from_file(&folder().join(&name)).unwrap();
-        assert_eq!(check(&source, &xyz()), [], "{name}: nothing to report, also inside the travel");
+        // Also inside the travel. The pocket is milled with a tool, and there is no tool table.
+        let found: Vec<_> = check(&source, &xyz()).iter().map(|found| (found.code, found.line())).collect();
+        let wanted: &[_] = if name == "pocket.mpf" { &[("W0004", 8)] } else { &[] };
+        assert_eq!(found, wanted, "{name}: nothing else to report");
         let last = shipped(&name).moves.pop().unwrap();
         assert_eq!(
             (last.kind, &last.events[..]),
@@ -200,7 +203,7 @@ fn a_cam_program_runs_from_first_to_last_block() {
     assert!(result.moves.iter().all(|shown| shown.modes.path_mode == PathMode::ExactStop));
     let reported: Vec<_> =
         result.warnings.iter().map(|warning| (warning.line(), warning.message.split('`').nth(1).unwrap())).collect();
-    assert_eq!(reported, [(6, "CYCLE800"), (18, "CYCLE832"), (27, "MCALL"), (27, "CYCLE81")]);
+    assert_eq!(reported, [(6, "CYCLE800"), (12, "D1"), (18, "CYCLE832"), (27, "MCALL"), (27, "CYCLE81")]);
     assert!(
         check(&ProgramSource::from_bytes("cam.mpf", CAM.as_bytes()), &xyzbc())
             .iter()

@@ -1,14 +1,12 @@
 //! Pose of the tool against published examples, and q(s) of a contour piece.
 
-use sollwert::base::{AxisId, AxisKind, AxisVector, MachinePoint, PartPoint, PerAxis, TimeBase};
+mod test_machine;
+
+use sollwert::base::{AxisId, AxisVector, MachinePoint, PartPoint, PerAxis};
 use sollwert::geometry::{Curve, Line};
 use sollwert::interpreter::{Feed, Modes};
 use sollwert::kinematics::{Kinematics, ToolPose};
-use sollwert::machine::{
-    AccelerationMode, ArcLimits, Axis, AxisLimits, BlendLaw, BlendLimits, BlendShape, CornerRule, CurvatureJump, Cycle,
-    FeedSettings, FineInterpolation, KinematicsSettings, Machine, PathMode, RotaryJoint, SmoothingSettings,
-    TimeLawKind,
-};
+use sollwert::machine::{AccelerationMode, KinematicsSettings, Machine, PathMode, RotaryJoint};
 use sollwert::program::BlockRef;
 use sollwert::smoothing::{ContourPiece, PieceKind};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, TAU};
@@ -18,65 +16,7 @@ const ROTARY: [AxisId; 2] = [AxisId::new(3), AxisId::new(4)];
 
 /// X, Y, Z and two rotary axes on the given chain.
 fn machine(rotary: [&str; 2], kinematics: KinematicsSettings) -> Machine {
-    let limits = AxisLimits {
-        velocity_max_lu_s: 333.0,
-        acceleration_max_lu_s2: 1000.0,
-        jerk_max_lu_s3: 15000.0,
-        transition_jerk_max_lu_s3: 10000.0,
-    };
-    let axis = |name: &str, kind: AxisKind, index: u32| Axis {
-        name: name.to_owned(),
-        kind,
-        index,
-        machine_axis: None,
-        limits,
-        follow_up_tolerance_lu: 0.01,
-        travel_lu: None,
-        home_lu: 0.0,
-        modulo: false,
-        dynamics: Default::default(),
-        drive: None,
-    };
-    Machine {
-        name: "test".to_owned(),
-        control: String::new(),
-        cycle: Cycle {
-            time_base: TimeBase::new((1_000_000, 1), 16),
-            control_cycle_s: 0.008,
-            sampling_ratio: 0.125,
-            fine_interpolation: FineInterpolation::Cubic,
-        },
-        look_ahead_blocks: 8,
-        feed: FeedSettings {
-            time_law: TimeLawKind::SevenPhase,
-            default_path_mode: PathMode::G642,
-            default_acceleration_mode: AccelerationMode::Soft,
-            corner_rule: CornerRule::FollowUp,
-            overload_ratio: 1.2,
-            curvature_jump: CurvatureJump::Signed,
-            arc_limits: ArcLimits::Worst,
-        },
-        smoothing: SmoothingSettings {
-            alpha_ratio: 2.5,
-            tolerance_ratio: 0.8,
-            tolerance_reversal_ratio: 0.6,
-            contour_tolerance_mm: 0.1,
-            rounding_distance_mm: None,
-            radial_acceleration_share: 0.2,
-            radial_jerk_share: 0.2,
-            blend_law: BlendLaw::Limits,
-            shape: BlendShape::Hermite3,
-            limits: BlendLimits::Axis,
-        },
-        kinematics,
-        axes: vec![
-            axis("X", AxisKind::Linear, 1),
-            axis("Y", AxisKind::Linear, 2),
-            axis("Z", AxisKind::Linear, 3),
-            axis(rotary[0], AxisKind::Rotary, 4),
-            axis(rotary[1], AxisKind::Rotary, 5),
-        ],
-    }
+    Machine { kinematics, ..test_machine::with_axes(&["X", "Y", "Z", rotary[0], rotary[1]], &[]) }
 }
 
 fn joint(place: usize, direction: [f64; 3], point_mm: [f64; 3]) -> RotaryJoint {

@@ -144,6 +144,14 @@ fn the_documentation_lists_exactly_the_words_not_acted_on() {
 }
 
 #[test]
+fn the_documentation_names_every_warning() {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/not-acted-on.md")).unwrap();
+    for (code, title) in codes::CODES.iter().filter(|(code, _)| code.starts_with('W')) {
+        assert!(text.contains(&format!("`{code}`")), "{code}: {title}");
+    }
+}
+
+#[test]
 fn words_and_codes_stand_once() {
     let words: Vec<_> = known_words().collect();
     assert!(words.windows(2).all(|pair| pair[0] < pair[1]), "sorted, and none twice");

@@ -1,12 +1,11 @@
 //! Moves in, contour out: published corner, tolerance from outside, continuity, counting, streaming.
 
-use sollwert::base::{AxisId, AxisKind, AxisVector, PartPoint, PerAxis, TimeBase};
+mod test_machine;
+
+use sollwert::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use sollwert::geometry::Curve;
 use sollwert::interpreter::{ArcGeometry, Event, Feed, Modes, Move, MoveKind};
-use sollwert::machine::{
-    AccelerationMode, ArcLimits, Axis, AxisLimits, BlendLaw, BlendLimits, BlendShape, CornerRule, CurvatureJump, Cycle,
-    FeedSettings, FineInterpolation, KinematicsSettings, Machine, PathMode, SmoothingSettings, TimeLawKind,
-};
+use sollwert::machine::{AccelerationMode, Machine, PathMode};
 use sollwert::program::{BlockRef, OpenedProgram, ProgramId};
 use sollwert::smoothing::{ContourPiece, Corner, PieceKind, Smoother};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -17,64 +16,7 @@ const Y: AxisId = AxisId::new(1);
 
 /// X, Y, Z linear and C rotary, with the smoothing of the Spinner MVC 850.
 fn machine() -> Machine {
-    let limits = AxisLimits {
-        velocity_max_lu_s: 333.0,
-        acceleration_max_lu_s2: 1000.0,
-        jerk_max_lu_s3: 15000.0,
-        transition_jerk_max_lu_s3: 10000.0,
-    };
-    let axis = |name: &str, kind: AxisKind, index: u32| Axis {
-        name: name.to_owned(),
-        kind,
-        index,
-        machine_axis: None,
-        limits,
-        follow_up_tolerance_lu: 0.01,
-        travel_lu: None,
-        home_lu: 0.0,
-        modulo: false,
-        dynamics: Default::default(),
-        drive: None,
-    };
-    Machine {
-        name: "test".to_owned(),
-        control: String::new(),
-        cycle: Cycle {
-            time_base: TimeBase::new((1_000_000, 1), 16),
-            control_cycle_s: 0.008,
-            sampling_ratio: 0.125,
-            fine_interpolation: FineInterpolation::Cubic,
-        },
-        look_ahead_blocks: 8,
-        feed: FeedSettings {
-            time_law: TimeLawKind::SevenPhase,
-            default_path_mode: PathMode::G642,
-            default_acceleration_mode: AccelerationMode::Soft,
-            corner_rule: CornerRule::FollowUp,
-            overload_ratio: 1.2,
-            curvature_jump: CurvatureJump::Signed,
-            arc_limits: ArcLimits::Worst,
-        },
-        smoothing: SmoothingSettings {
-            alpha_ratio: 2.5,
-            tolerance_ratio: 0.8,
-            tolerance_reversal_ratio: 0.6,
-            contour_tolerance_mm: 0.1,
-            rounding_distance_mm: None,
-            radial_acceleration_share: 0.2,
-            radial_jerk_share: 0.2,
-            blend_law: BlendLaw::Limits,
-            shape: BlendShape::Hermite3,
-            limits: BlendLimits::Axis,
-        },
-        kinematics: KinematicsSettings::Cartesian,
-        axes: vec![
-            axis("X", AxisKind::Linear, 1),
-            axis("Y", AxisKind::Linear, 2),
-            axis("Z", AxisKind::Linear, 3),
-            axis("C", AxisKind::Rotary, 4),
-        ],
-    }
+    test_machine::with_axes(&["X", "Y", "Z", "C"], &[])
 }
 
 fn vector(components: &[f64]) -> AxisVector {

@@ -14,12 +14,17 @@ use crate::machine::{AccelerationMode, PathMode};
 use crate::program::syntax::{Address, AddressValue, Form, Target, Typed, Word, WordKind};
 use crate::program::words::{GFunction, Keyword};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
+use std::sync::Arc;
 
 /// M6: the tool change comes before the motion of its block, at rest.
 const TOOL_CHANGE: u32 = 6;
 /// M0, M1: stop. M2, M17, M30: end. They come after the motion of their block.
 const STOPS: [u32; 5] = [0, 1, 2, 17, 30];
 const ENDS: [u32; 3] = [2, 17, 30];
+/// T0: no tool.
+const NO_TOOL: &str = "0";
+/// D0: no length and no radius, whatever the tool.
+const NO_EDGE: u32 = 0;
 /// Most circles that TURN adds.
 const TURNS_MAX: u32 = 999;
 /// Smallest F of the control, in the unit of F.
@@ -199,7 +204,11 @@ impl Interpreter {
             block.addresses.push(address);
         }
         if address == Address::Tool {
-            let tool = self.tool(value)?;
+            let name = self.tool(value)?;
+            if &*name != NO_TOOL {
+                self.report_tool("tool", &name, columns);
+            }
+            let tool = Event::Tool(name);
             block.tool_events.push(tool.clone());
             block.events.push(tool);
             return Ok(());
@@ -226,7 +235,13 @@ impl Interpreter {
                 block.spindle_speed_rpm = Some((speed_rpm, columns.clone()));
                 block.events.push(Event::SpindleSpeed { speed_rpm });
             }
-            Address::Edge => block.events.push(Event::Edge(whole(typed, columns, "D")?)),
+            Address::Edge => {
+                let edge = whole(typed, columns, "D")?;
+                if edge != NO_EDGE {
+                    self.report_tool("edge", &format!("D{edge}"), columns);
+                }
+                block.events.push(Event::Edge(edge));
+            }
             Address::M => m_function(whole(typed, columns, "M")?, block),
             Address::RoundingDistance => self.modal.rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?),
             Address::RapidRoundingDistance => {
@@ -249,12 +264,23 @@ impl Interpreter {
             .label("expected 0 or more"))
     }
 
-    fn tool(&self, value: &AddressValue) -> Outcome<Event> {
-        let text = match evaluate(&value.value, &self.variables)? {
+    /// Name of the tool, or its number as text.
+    fn tool(&self, value: &AddressValue) -> Outcome<Arc<str>> {
+        Ok(match evaluate(&value.value, &self.variables)? {
             Value::Text(text) => text,
             number => whole(Typed(number.number(&value.value.columns)?), &value.value.columns, "T")?.to_string().into(),
-        };
-        Ok(Event::Tool(text))
+        })
+    }
+
+    /// There is no tool table: reports the first tool or edge that is selected, once a run.
+    fn report_tool(&mut self, what: &str, name: &str, columns: &Columns) {
+        if self.first_report(codes::NO_TOOL_DATA) {
+            let message = format!("{what} `{name}` has no data: length and radius of every tool count as 0");
+            let fault = Fault::new(codes::NO_TOOL_DATA, columns.clone(), message)
+                .label("no data")
+                .help("positions are those of a tool tip without length; further tools are not reported");
+            self.warn(*fault);
+        }
     }
 
     fn take_feed(&mut self, block: &mut Collected) -> Outcome<()> {

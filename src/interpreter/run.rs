@@ -50,6 +50,7 @@ pub struct Interpreter {
     /// Block numbers that jumps have found, by line and direction of the jump.
     pub(super) found_numbers: BTreeMap<(u32, Direction, u64), Option<Cursor>>,
     warnings: Vec<Diagnostic>,
+    /// Words and codes that were reported.
     warned: BTreeSet<&'static str>,
     pub(super) travel_warned: PerAxis<bool>,
     opened: Option<Event>,
@@ -202,7 +203,7 @@ impl Interpreter {
 
     /// Reports a word that is not acted on, once a run.
     pub(super) fn report_word(&mut self, entry: &'static NotActedOn, columns: &Columns) {
-        if self.warned.insert(entry.word) {
+        if self.first_report(entry.word) {
             let fault = Fault::new(
                 codes::NOT_ACTED_ON,
                 columns.clone(),
@@ -211,6 +212,11 @@ impl Interpreter {
             .label("known, but not acted on");
             self.warn(*fault);
         }
+    }
+
+    /// True the first time that this word or code is to be reported.
+    pub(super) fn first_report(&mut self, word_or_code: &'static str) -> bool {
+        self.warned.insert(word_or_code)
     }
 
     /// Puts a finding on the list of warnings.

@@ -51,8 +51,8 @@ pub struct CycleOutput {
     pub tool_setpoint: ToolPose,
     /// Tool in the part frame, by actual positions.
     pub tool_actual: ToolPose,
-    /// Distance of the actual tool point from the path of the set-points.
-    pub contour_error_mm: f64,
+    /// Distance of the actual tool point from the path of the set-points; `None` where every axis is ideal.
+    pub contour_error_mm: Option<f64>,
 }
 
 /// Position cycle of an axis, and how it is reached from t_s.
@@ -119,7 +119,7 @@ impl<S: PieceSource> Kernel<S> {
             rows: Vec::new(),
             tool_setpoint: tool,
             tool_actual: tool,
-            contour_error_mm: 0.0,
+            contour_error_mm: None,
         };
         let stages: Vec<Drive> = machine
             .axes
@@ -215,8 +215,9 @@ impl<S: PieceSource> Kernel<S> {
         self.output.tool_setpoint = self.kinematics.tool_pose(&sent);
         self.output.tool_actual = self.kinematics.tool_pose(&actual);
         self.contour_error.push(self.output.tool_setpoint.position_mm);
-        self.output.contour_error_mm =
-            self.contour_error.distance_mm(self.output.tool_actual.position_mm).unwrap_or(0.0);
+        if self.drives.iter().any(|drive| matches!(drive, Drive::Cascade(_))) {
+            self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
+        }
     }
 
     /// What the last cycle produced.

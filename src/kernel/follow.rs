@@ -5,14 +5,13 @@
 
 use super::cycle::{AxisRow, diverged};
 use super::figures::Figures;
-use super::record::{record_alarm, record_follow};
-use super::run::drive_warnings;
-use super::setpoint_table::SetpointTable;
-use super::summary::{RunSummary, Warning};
+use super::record::{FollowRow, record_alarm, record_follow};
+use super::setpoint_table::{SetpointTable, row_ticks};
+use super::summary::{RunSummary, Warning, drive_warnings};
 use crate::base::{Diagnostic, MachinePoint, PerAxis, Tick};
 use crate::drive::{Drive, DriveInput, Start};
 use crate::interpolator::AxisSetpoint;
-use crate::kinematics::{Kinematics, ToolPose};
+use crate::kinematics::Kinematics;
 use crate::machine::{Loaded, Machine};
 use crate::recorder::{Recorder, RecordingSetup, SignalChoice};
 use serde_json::{Value, json};
@@ -42,22 +41,6 @@ pub struct FollowOutcome {
     pub warnings: Vec<Diagnostic>,
     /// What ended the run early.
     pub alarm: Option<Diagnostic>,
-}
-
-/// Ticks between rows: the shortest position cycle.
-pub(super) fn row_ticks(machine: &Machine) -> u64 {
-    let cycles = machine.axes.iter().filter_map(|axis| axis.drive.as_ref()).map(|drive| drive.position_cycle_ticks);
-    cycles.min().unwrap_or(machine.cycle.time_base.ticks_per_setpoint())
-}
-
-/// One row of `follow`.
-pub(super) struct FollowRow<'a> {
-    /// When.
-    pub(super) tick: Tick,
-    /// Axes that stepped at this tick.
-    pub(super) rows: &'a [AxisRow],
-    /// Tool by set-points and by actual positions, in the part frame.
-    pub(super) tools: [ToolPose; 2],
 }
 
 /// Follows `table`; records it. Errors: the recording cannot be written.

@@ -4,7 +4,6 @@
 //! recorded when (tool poses at 100 Hz); does not encode.
 
 use super::cycle::{AxisRow, CycleOutput};
-use super::follow::FollowRow;
 use crate::base::{Diagnostic, Tick, TimeBase};
 use crate::kinematics::ToolPose as Pose;
 use crate::machine::Machine;
@@ -12,6 +11,16 @@ use crate::recorder::{EventRecord, Recorder, ToolPose};
 
 /// Distance of tool poses: 100 Hz.
 const POSE_PERIOD_NS: u64 = 10_000_000;
+
+/// One row of `follow`.
+pub(super) struct FollowRow<'a> {
+    /// When.
+    pub(super) tick: Tick,
+    /// Axes that stepped at this tick.
+    pub(super) rows: &'a [AxisRow],
+    /// Tool by set-points and by actual positions, in the part frame.
+    pub(super) tools: [Pose; 2],
+}
 
 /// Records one cycle. Errors: the disk is full or gone.
 pub(super) fn record_cycle(recorder: &mut Recorder, machine: &Machine, output: &CycleOutput) -> Result<(), Diagnostic> {
@@ -34,7 +43,7 @@ pub(super) fn record_cycle(recorder: &mut Recorder, machine: &Machine, output: &
             recorder.event(tick, Some(begun.block), event);
         }
     }
-    recorder.path(tick, &setpoint.path, Some(output.contour_error_mm));
+    recorder.path(tick, &setpoint.path, output.contour_error_mm);
     let cycle_ticks = machine.cycle.time_base.ticks_per_setpoint();
     record_poses(recorder, &machine.cycle.time_base, tick, cycle_ticks, [output.tool_setpoint, output.tool_actual]);
     record_rows(recorder, &output.rows);

@@ -6,7 +6,7 @@
 use super::cycle::{Kernel, Status};
 use super::preparation::{PieceSource, Preparation};
 use super::record::{record_alarm, record_cycle};
-use super::summary::RunSummary;
+use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
 use crate::base::Diagnostic;
 use crate::machine::{Loaded, Machine};
@@ -186,31 +186,6 @@ fn conclude<S: PieceSource>(
         "run ends"
     );
     Ok(RunOutcome { summary, warnings, alarm, deadlines, recording })
-}
-
-/// One warning for all axes whose drives are representative, one for all that are ideal.
-pub(super) fn drive_warnings(machine: &Machine, drives: bool) -> Vec<Diagnostic> {
-    let names = |wanted: &dyn Fn(&crate::machine::Axis) -> bool| -> Vec<&str> {
-        machine.axes.iter().filter(|axis| wanted(axis)).map(|axis| axis.name.as_str()).collect()
-    };
-    let mut warnings = Vec::new();
-    if !drives {
-        return warnings;
-    }
-    let representative = names(&|axis| axis.drive.as_ref().is_some_and(|drive| !drive.identified));
-    if !representative.is_empty() {
-        let message = format!(
-            "representative drive: the drive data of {} are not identified on a real machine, so that deviations, following errors and currents show the class of machine, not this one",
-            representative.join(", ")
-        );
-        warnings.push(Diagnostic::warning("D0002", message));
-    }
-    let ideal = names(&|axis| axis.drive.is_none());
-    if !ideal.is_empty() {
-        let message = format!("ideal axis: {} without drive data: actual = set-point", ideal.join(", "));
-        warnings.push(Diagnostic::warning("D0003", message));
-    }
-    warnings
 }
 
 /// Holds the loop to the wall clock.

@@ -3,7 +3,6 @@
 //! In: CSV text with the header `time_s,X_mm,Y_mm,A_deg` (or the names of an export, `X.position_setpoint_mm`), one row a position
 //! period; `X_load_n_m` is an outside torque at the motor shaft. Out: [`SetpointTable`] in mm and rad. Does not resample.
 
-use super::follow::row_ticks;
 use crate::base::{AxisId, AxisKind, Diagnostic, SourceText, Tick, units};
 use crate::machine::Machine;
 use crate::recorder::{Content, Recording, TopicKind, axis_field};
@@ -136,6 +135,12 @@ impl SetpointTable {
         }
         Ok(table)
     }
+}
+
+/// Ticks between rows: the shortest position cycle.
+pub(super) fn row_ticks(machine: &Machine) -> u64 {
+    let cycles = machine.axes.iter().filter_map(|axis| axis.drive.as_ref()).map(|drive| drive.position_cycle_ticks);
+    cycles.min().unwrap_or(machine.cycle.time_base.ticks_per_setpoint())
 }
 
 /// Positions of one axis out of a recording.

@@ -4,7 +4,7 @@
 //! wall-clock time, because it is also recorded: the command adds the name of the recording when it prints.
 
 use super::figures::{AxisFigures, Figures};
-use crate::base::{AxisKind, Diagnostic, Severity, units};
+use crate::base::{AxisId, AxisKind, Diagnostic, Severity, units};
 use crate::feed::Limit;
 use crate::machine::Machine;
 use serde::Serialize;
@@ -139,6 +139,30 @@ pub(super) fn limit_name(machine: &Machine, limit: Limit) -> String {
         Some(axis) if carries_axis(limit) => format!("{}.{}", machine.axis(axis).name, limit.kind.name()),
         _ => limit.kind.name().to_owned(),
     }
+}
+
+/// One warning for all axes whose drives are representative, one for all that are ideal.
+pub(super) fn drive_warnings(machine: &Machine, drives: bool) -> Vec<Diagnostic> {
+    let mut warnings = Vec::new();
+    if !drives {
+        return warnings;
+    }
+    let names = |axes: Vec<AxisId>| {
+        let names: Vec<&str> = axes.iter().map(|id| machine.axis(*id).name.as_str()).collect();
+        (!names.is_empty()).then(|| names.join(", "))
+    };
+    if let Some(names) = names(machine.representative_drives().collect()) {
+        let message = format!(
+            "representative drive: the drive data of {names} are not identified on a real machine, so that deviations, following errors and \
+             currents show the class of machine, not this one"
+        );
+        warnings.push(Diagnostic::warning("D0002", message));
+    }
+    if let Some(names) = names(machine.ideal_axes().collect()) {
+        let message = format!("ideal axis: {names} without drive data: actual = set-point");
+        warnings.push(Diagnostic::warning("D0003", message));
+    }
+    warnings
 }
 
 /// The contract's keys without an axis: feed, corner, cycle, look_ahead, dwell, in_position, override.

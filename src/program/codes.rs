@@ -111,4 +111,5 @@ codes! {
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";
     CHECK_STOPPED "W0003" "The check did not run the program to its end";
+    NO_TOOL_DATA "W0004" "A tool or tool edge without data: its length and radius count as 0";
 }

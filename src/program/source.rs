@@ -42,7 +42,6 @@ const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 impl ProgramSource {
     /// Reads a file. An unreadable file is wrong usage, not a wrong program: the caller exits with 2.
-    #[expect(clippy::result_large_err, reason = "once a run, and the caller prints it")]
     pub fn from_file(path: &Path) -> Result<Self, Diagnostic> {
         match std::fs::read(path) {
             Ok(bytes) => Ok(Self::from_bytes(&path.to_string_lossy(), bytes)),

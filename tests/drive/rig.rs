@@ -1,9 +1,12 @@
 //! Test machines of models/drive.md section 2, and a bench to run one axis on.
 
-use sollwert::base::{AxisKind, TimeBase};
+#[path = "../test_machine/mod.rs"]
+mod test_machine;
+
+use sollwert::base::TimeBase;
 use sollwert::drive::{AxisDrive, AxisSignals, DriveInput, Start};
-use sollwert::machine::{Axis, AxisLimits, DriveData, EncoderData, MechanicsData, MotorData};
-use std::f64::consts::TAU;
+use sollwert::machine::{Axis, DriveData};
+use test_machine::{shipped, with_axes};
 
 /// Drive data with their clock.
 #[derive(Clone, Debug)]
@@ -13,110 +16,46 @@ pub struct Rig {
     pub start: Start,
 }
 
-/// "MVC850 X": 1 ms, 125 µs, 62.5 µs.
-pub fn mvc_x() -> Rig {
+/// A shipped axis: plain control without feed-forward and delays, its torque feed-forward that of "MVC850 X".
+fn rig(machine: &str, axis: &str, sets: &[&str]) -> Rig {
+    let machine = shipped(machine, sets);
+    let axis = machine.axis_by_name(axis).expect("a shipped axis");
     let data = DriveData {
-        identified: false,
-        in_position_coarse_lu: 0.04,
-        in_position_fine_lu: 0.01,
-        position_cycle_ticks: 16,
-        speed_cycle_ticks: 2,
-        current_cycle_ticks: 1,
-        position_gain_per_s: 50.0,
         velocity_feedforward_ratio: 0.0,
-        torque_feedforward_ratio: 0.0,
         feedforward_inertia_kg_m2: 0.0085,
         setpoint_delay_s: 0.0,
         feedforward_delay_s: 0.0,
-        speed_setpoint_max_lu_s: 400.0,
-        speed_gain_n_m_s_per_rad: 2.0,
-        speed_reset_time_s: 0.010,
-        current_gain_v_per_a: 22.0,
-        current_reset_time_s: 0.002,
-        current_max_a: 28.0,
-        voltage_max_v: 245.0,
-        motor: MotorData {
-            resistance_ohm: 0.75,
-            inductance_h: 6.5e-3,
-            back_emf_v_s_per_rad: 0.43,
-            torque_constant_n_m_per_a: 1.30,
-        },
-        mechanics: MechanicsData {
-            transmission_lu_per_rad: 12.0 / TAU,
-            inertia_kg_m2: 0.0085,
-            viscous_friction_n_m_s_per_rad: 0.010,
-            coulomb_friction_n_m: 0.6,
-            breakaway_friction_n_m: 0.6,
-            gravity_n_m: 0.0,
-            gravity_sin_n_m: 0.0,
-            gravity_cos_n_m: 0.0,
-        },
-        encoder: EncoderData { position_resolution_lu: 0.0, motor_resolution_rad: 0.0 },
+        ..machine.axis(axis).drive.clone().expect("a shipped axis has a drive")
     };
-    Rig { data, time_base: TimeBase::new((1_000_000, 1), 16), start: Start::Held }
+    Rig { data, time_base: machine.cycle.time_base, start: Start::Held }
+}
+
+/// "MVC850 X": 1 ms, 125 µs, 62.5 µs.
+pub fn mvc_x() -> Rig {
+    rig("spinner_mvc850", "X", &[])
 }
 
 /// "MVC850 Y".
 pub fn mvc_y() -> Rig {
-    let mut rig = mvc_x();
-    rig.data.speed_gain_n_m_s_per_rad = 2.2;
-    rig.data.speed_reset_time_s = 0.011;
-    rig.data.mechanics.inertia_kg_m2 = 0.0110;
-    rig.data.mechanics.viscous_friction_n_m_s_per_rad = 0.012;
-    rig.friction(1.2, 1.2)
+    rig("spinner_mvc850", "Y", &[])
 }
+
+/// The cycles of the axis C would make the ticks shorter than the current cycle of the others.
+const UCP_CYCLES: &[&str] = &[
+    "cycle.t_cyl_ms=2",
+    "axes.C.drive.position_cycle_ms=2",
+    "axes.C.drive.speed_cycle_us=125",
+    "axes.C.drive.current_cycle_us=125",
+];
 
 /// "UCP710 Z": 2 ms, 125 µs, 125 µs; vertical.
 pub fn ucp_z() -> Rig {
-    let mut rig = mvc_x();
-    rig.time_base = TimeBase::new((2_000_000, 1), 16);
-    let data = &mut rig.data;
-    (data.position_cycle_ticks, data.speed_cycle_ticks, data.current_cycle_ticks) = (16, 1, 1);
-    data.speed_setpoint_max_lu_s = 550.0;
-    data.speed_gain_n_m_s_per_rad = 2.8;
-    data.speed_reset_time_s = 0.012;
-    data.current_gain_v_per_a = 8.0;
-    data.current_max_a = 45.0;
-    data.motor = MotorData {
-        resistance_ohm: 0.35,
-        inductance_h: 3.6e-3,
-        back_emf_v_s_per_rad: 0.50,
-        torque_constant_n_m_per_a: 1.50,
-    };
-    data.mechanics.transmission_lu_per_rad = 20.0 / TAU;
-    data.mechanics.inertia_kg_m2 = 0.0120;
-    data.mechanics.gravity_n_m = 4.0;
-    rig.friction(1.4, 1.4)
+    rig("mikron_ucp710", "Z", UCP_CYCLES)
 }
 
 /// "UCP710 A": a tilting table of gear ratio 120, positions in rad.
 pub fn ucp_a() -> Rig {
-    let mut rig = ucp_z();
-    let data = &mut rig.data;
-    data.position_gain_per_s = 33.33;
-    data.speed_setpoint_max_lu_s = 95_f64.to_radians();
-    data.speed_gain_n_m_s_per_rad = 0.6;
-    data.speed_reset_time_s = 0.015;
-    data.current_gain_v_per_a = 20.0;
-    data.current_reset_time_s = 0.003;
-    data.current_max_a = 15.0;
-    data.motor = MotorData {
-        resistance_ohm: 1.1,
-        inductance_h: 9.0e-3,
-        back_emf_v_s_per_rad: 0.45,
-        torque_constant_n_m_per_a: 1.35,
-    };
-    data.mechanics = MechanicsData {
-        transmission_lu_per_rad: 1.0 / 120.0,
-        inertia_kg_m2: 0.0032,
-        viscous_friction_n_m_s_per_rad: 0.004,
-        coulomb_friction_n_m: 0.7,
-        breakaway_friction_n_m: 0.7,
-        gravity_n_m: 0.0,
-        gravity_sin_n_m: 1.1,
-        gravity_cos_n_m: 0.25,
-    };
-    rig
+    rig("mikron_ucp710", "A", UCP_CYCLES)
 }
 
 /// The three sets of every closed form.
@@ -131,24 +70,7 @@ pub fn input(position_setpoint_lu: f64) -> DriveInput {
 
 /// An axis around drive data (or none).
 pub fn axis(drive: Option<DriveData>) -> Axis {
-    Axis {
-        name: "X".to_owned(),
-        kind: AxisKind::Linear,
-        index: 1,
-        machine_axis: None,
-        limits: AxisLimits {
-            velocity_max_lu_s: 333.0,
-            acceleration_max_lu_s2: 1000.0,
-            jerk_max_lu_s3: 15_000.0,
-            transition_jerk_max_lu_s3: 10_000.0,
-        },
-        follow_up_tolerance_lu: 0.01,
-        travel_lu: None,
-        home_lu: 0.0,
-        modulo: false,
-        dynamics: Default::default(),
-        drive,
-    }
+    Axis { drive, ..with_axes(&["X"], &[]).axes.remove(0) }
 }
 
 impl Rig {

@@ -3,7 +3,10 @@
 //! In: points and modes. Out: planned pieces and set-points, driven as the kernel drives them. Does not check anything.
 #![allow(dead_code)]
 
-use sollwert::base::{AxisId, AxisKind, PartPoint, PerAxis, TimeBase};
+#[path = "../test_machine/mod.rs"]
+mod test_machine;
+
+use sollwert::base::{AxisId, PartPoint, PerAxis, TimeBase};
 use sollwert::feed::{PlannedPiece, Planner};
 use sollwert::interpolator::{Interpolator, Setpoint};
 use sollwert::interpreter::{ArcGeometry, Feed, Modes, Move, MoveKind};
@@ -14,77 +17,20 @@ use sollwert::smoothing::Smoother;
 
 /// The published machine of [Essid 2019, table 2]: 3 axes, 20 m/min, 1 m/s², 15 m/s³, transition jerk 10 m/s³, t_s = 1 ms.
 pub fn spinner() -> Machine {
-    let limits = AxisLimits {
-        velocity_max_lu_s: 20_000.0 / 60.0,
-        acceleration_max_lu_s2: 1000.0,
-        jerk_max_lu_s3: 15_000.0,
-        transition_jerk_max_lu_s3: 10_000.0,
-    };
-    let axis = |(i, name): (usize, &str)| Axis {
-        name: name.to_owned(),
-        kind: AxisKind::Linear,
-        index: i as u32 + 1,
-        machine_axis: None,
-        limits,
-        follow_up_tolerance_lu: 0.01,
-        travel_lu: None,
-        home_lu: 0.0,
-        modulo: false,
-        dynamics: Default::default(),
-        drive: None,
-    };
-    Machine {
-        name: "Spinner MVC 850".to_owned(),
-        control: "test".to_owned(),
-        cycle: Cycle {
-            time_base: TimeBase::new((1_000_000, 1), 4),
-            control_cycle_s: 0.008,
-            sampling_ratio: 0.125,
-            fine_interpolation: FineInterpolation::Cubic,
-        },
-        look_ahead_blocks: 8,
-        feed: FeedSettings {
-            time_law: TimeLawKind::SevenPhase,
-            default_path_mode: PathMode::G642,
-            default_acceleration_mode: AccelerationMode::Soft,
-            corner_rule: CornerRule::FollowUp,
-            overload_ratio: 1.2,
-            curvature_jump: CurvatureJump::Signed,
-            arc_limits: ArcLimits::Worst,
-        },
-        smoothing: SmoothingSettings {
-            alpha_ratio: 2.5,
-            tolerance_ratio: 0.8,
-            tolerance_reversal_ratio: 0.6,
-            contour_tolerance_mm: 0.1,
-            rounding_distance_mm: None,
-            radial_acceleration_share: 0.2,
-            radial_jerk_share: 0.2,
-            blend_law: BlendLaw::Limits,
-            shape: BlendShape::Hermite3,
-            limits: BlendLimits::Axis,
-        },
-        kinematics: KinematicsSettings::Cartesian,
-        axes: ["X", "Y", "Z"].into_iter().enumerate().map(axis).collect(),
-    }
+    with_axes(&["X", "Y", "Z"])
+}
+
+fn with_axes(axes: &[&str]) -> Machine {
+    let mut machine = test_machine::with_axes(axes, &[]);
+    // Without drives a machine has one tick a set-point; four leave room for a position cycle.
+    machine.cycle.time_base = TimeBase::new((1_000_000, 1), 4);
+    machine
 }
 
 /// The Spinner with a rotary axis A: 15 rpm, 0.83 rot/s², 5 rot/s³.
 pub fn with_rotary() -> Machine {
-    let mut machine = spinner();
-    let mut axis = machine.axes[0].clone();
-    axis.name = "A".to_owned();
-    axis.kind = AxisKind::Rotary;
-    axis.index = 4;
-    let turn = std::f64::consts::TAU;
-    axis.limits = AxisLimits {
-        velocity_max_lu_s: 15.0 / 60.0 * turn,
-        acceleration_max_lu_s2: 0.83 * turn,
-        jerk_max_lu_s3: 5.0 * turn,
-        transition_jerk_max_lu_s3: 5.0 * turn,
-    };
-    axis.follow_up_tolerance_lu = 1e-4;
-    machine.axes.push(axis);
+    let mut machine = with_axes(&["X", "Y", "Z", "A"]);
+    machine.axes[3].follow_up_tolerance_lu = 1e-4;
     machine
 }
 

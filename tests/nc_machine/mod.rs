@@ -1,95 +1,35 @@
-//! Machines made by hand, and short ways to run a program: for tests and benches of the rooms `program` and `interpreter`.
+//! Two machines, and short ways to run a program: for tests and benches of the rooms `program` and `interpreter`.
 #![allow(dead_code)]
 
-use sollwert::base::units::rad_from_deg;
-use sollwert::base::{AxisKind, Diagnostic, TimeBase};
+#[path = "../test_machine/mod.rs"]
+mod test_machine;
+
+use sollwert::base::Diagnostic;
 use sollwert::interpreter::{Interpreter, Listing, Move};
-use sollwert::machine::*;
+use sollwert::machine::Machine;
 use sollwert::program::ProgramSource;
+use std::sync::LazyLock;
 
-/// A linear axis.
-pub fn linear(name: &str, travel_mm: [f64; 2]) -> Axis {
-    Axis {
-        name: name.to_owned(),
-        kind: AxisKind::Linear,
-        index: 1,
-        machine_axis: None,
-        limits: AxisLimits {
-            velocity_max_lu_s: 500.0,
-            acceleration_max_lu_s2: 1000.0,
-            jerk_max_lu_s3: 15000.0,
-            transition_jerk_max_lu_s3: 10000.0,
-        },
-        follow_up_tolerance_lu: 0.01,
-        travel_lu: Some(travel_mm),
-        home_lu: 0.0,
-        modulo: false,
-        drive: None,
-    }
-}
-
-/// A rotary axis; endless without travel.
-pub fn rotary(name: &str, travel_deg: Option<[f64; 2]>) -> Axis {
-    Axis {
-        kind: AxisKind::Rotary,
-        travel_lu: travel_deg.map(|travel| travel.map(rad_from_deg)),
-        modulo: travel_deg.is_none(),
-        ..linear(name, [0.0, 0.0])
-    }
-}
-
-/// A machine with these axes.
-pub fn machine(axes: Vec<Axis>) -> Machine {
-    Machine {
-        name: "Test".to_owned(),
-        control: "SINUMERIK 840D".to_owned(),
-        cycle: Cycle {
-            time_base: TimeBase::new((1_000_000, 1), 16),
-            control_cycle_s: 0.001,
-            sampling_ratio: 1.0,
-            fine_interpolation: FineInterpolation::Linear,
-        },
-        look_ahead_blocks: 8,
-        feed: FeedSettings {
-            time_law: TimeLawKind::SevenPhase,
-            default_path_mode: PathMode::G642,
-            default_acceleration_mode: AccelerationMode::Soft,
-            corner_rule: CornerRule::FollowUp,
-            overload_ratio: 1.2,
-            curvature_jump: CurvatureJump::Signed,
-            arc_limits: ArcLimits::Worst,
-        },
-        smoothing: SmoothingSettings {
-            alpha_ratio: 2.5,
-            tolerance_ratio: 0.8,
-            tolerance_reversal_ratio: 0.6,
-            contour_tolerance_mm: 0.1,
-            rounding_distance_mm: None,
-            radial_acceleration_share: 0.2,
-            radial_jerk_share: 0.2,
-            blend_law: BlendLaw::Limits,
-            shape: BlendShape::Hermite3,
-            limits: BlendLimits::Axis,
-        },
-        kinematics: KinematicsSettings::Cartesian,
-        axes,
-    }
-}
-
-/// Three linear axes with the travel of the Spinner MVC 850.
+/// The Spinner MVC 850: three linear axes.
 pub fn xyz() -> Machine {
-    machine(vec![linear("X", [-425.0, 425.0]), linear("Y", [-250.0, 250.0]), linear("Z", [0.0, 500.0])])
+    // Once: thousands of random programs run on it.
+    static MACHINE: LazyLock<Machine> = LazyLock::new(|| test_machine::shipped("spinner_mvc850", &[]));
+    MACHINE.clone()
 }
 
-/// Head B, table C (endless).
+/// Head B, table C (endless), all at home at 0.
 pub fn xyzbc() -> Machine {
-    machine(vec![
-        linear("X", [-400.0, 400.0]),
-        linear("Y", [-300.0, 300.0]),
-        linear("Z", [-100.0, 650.0]),
-        rotary("B", Some([-110.0, 110.0])),
-        rotary("C", None),
-    ])
+    static MACHINE: LazyLock<Machine> = LazyLock::new(|| {
+        let sets = [
+            "axes.X.travel_mm=[-400, 400]",
+            "axes.Y.travel_mm=[-300, 300]",
+            "axes.Z.travel_mm=[-100, 650]",
+            "axes.B.travel_deg=[-110, 110]",
+            "axes.C.modulo=true",
+        ];
+        test_machine::with_axes(&["X", "Y", "Z", "B", "C"], &sets)
+    });
+    MACHINE.clone()
 }
 
 /// What a program comes to.

@@ -1,11 +1,14 @@
 //! A machine, a run with signals in closed form, and ways to look into the bytes of a recording that do not pass through our
 //! own reader.
 
-use sollwert::base::{AxisId, AxisKind, Tick, TimeBase};
+#[path = "../test_machine/mod.rs"]
+mod test_machine;
+
+use sollwert::base::{AxisId, AxisKind, Tick};
 use sollwert::drive::AxisSignals;
 use sollwert::feed::{Limit, LimitKind};
 use sollwert::interpolator::{AxisSetpoint, PathSample};
-use sollwert::machine::*;
+use sollwert::machine::Machine;
 use sollwert::program::{BlockRef, OpenedProgram, ProgramId};
 use sollwert::recorder::{EventRecord, Recorder, RecordingSetup, ToolPose};
 use std::io::{self, Write};
@@ -23,106 +26,17 @@ pub const MACHINE_TEXT: &str = "format = 1\nname = \"Test machine, ä\"\n";
 /// Figures of a run; `recording` must not get into the file.
 pub const SUMMARY: &str = r#"{"format": 1, "program": "folder_of_someone/main.mpf", "cycle_time_s": 0.1, "limits": {"feed": 0.25, "X.jerk": 0.75}, "recording": "folder_of_someone/out.mcap"}"#;
 
-fn drive() -> DriveData {
-    DriveData {
-        identified: false,
-        in_position_coarse_lu: 0.04,
-        in_position_fine_lu: 0.01,
-        position_cycle_ticks: POSITION_TICKS,
-        speed_cycle_ticks: 1,
-        current_cycle_ticks: 1,
-        position_gain_per_s: 50.0,
-        velocity_feedforward_ratio: 1.0,
-        torque_feedforward_ratio: 0.0,
-        feedforward_inertia_kg_m2: 0.01,
-        setpoint_delay_s: 0.0,
-        feedforward_delay_s: 0.0,
-        speed_setpoint_max_lu_s: f64::INFINITY,
-        speed_gain_n_m_s_per_rad: 2.0,
-        speed_reset_time_s: 0.01,
-        current_gain_v_per_a: 20.0,
-        current_reset_time_s: 0.002,
-        current_max_a: f64::INFINITY,
-        voltage_max_v: f64::INFINITY,
-        motor: MotorData {
-            resistance_ohm: 1.0,
-            inductance_h: 0.006,
-            back_emf_v_s_per_rad: 0.4,
-            torque_constant_n_m_per_a: 1.3,
-        },
-        mechanics: MechanicsData {
-            transmission_lu_per_rad: 2.0,
-            inertia_kg_m2: 0.01,
-            viscous_friction_n_m_s_per_rad: 0.01,
-            coulomb_friction_n_m: 0.5,
-            breakaway_friction_n_m: 0.5,
-            gravity_n_m: 0.0,
-            gravity_sin_n_m: 0.0,
-            gravity_cos_n_m: 0.0,
-        },
-        encoder: EncoderData { position_resolution_lu: 0.0, motor_resolution_rad: 0.0 },
-    }
-}
-
 /// Linear X with a drive, linear Y without one, rotary C with a drive.
 pub fn machine() -> Machine {
-    let drive = drive();
-    let axis = |name: &str, kind, index, drive| Axis {
-        name: name.to_owned(),
-        kind,
-        index,
-        machine_axis: Some(format!("AX{index}")),
-        limits: AxisLimits {
-            velocity_max_lu_s: 300.0,
-            acceleration_max_lu_s2: 1000.0,
-            jerk_max_lu_s3: 10_000.0,
-            transition_jerk_max_lu_s3: 10_000.0,
-        },
-        follow_up_tolerance_lu: 0.01,
-        travel_lu: None,
-        home_lu: 0.0,
-        modulo: false,
-        dynamics: Default::default(),
-        drive,
-    };
-    Machine {
-        name: "Test machine".to_owned(),
-        control: "SINUMERIK 840D".to_owned(),
-        cycle: Cycle {
-            time_base: TimeBase::new((2_000_000, 1), TICKS_PER_SETPOINT),
-            control_cycle_s: 0.008,
-            sampling_ratio: 0.25,
-            fine_interpolation: FineInterpolation::Cubic,
-        },
-        look_ahead_blocks: 8,
-        feed: FeedSettings {
-            time_law: TimeLawKind::SevenPhase,
-            default_path_mode: PathMode::G642,
-            default_acceleration_mode: AccelerationMode::Soft,
-            corner_rule: CornerRule::FollowUp,
-            overload_ratio: 1.2,
-            curvature_jump: CurvatureJump::Signed,
-            arc_limits: ArcLimits::Worst,
-        },
-        smoothing: SmoothingSettings {
-            alpha_ratio: 2.5,
-            tolerance_ratio: 0.8,
-            tolerance_reversal_ratio: 0.6,
-            contour_tolerance_mm: 0.1,
-            rounding_distance_mm: None,
-            radial_acceleration_share: 0.2,
-            radial_jerk_share: 0.2,
-            blend_law: BlendLaw::Limits,
-            shape: BlendShape::Hermite3,
-            limits: BlendLimits::Axis,
-        },
-        kinematics: KinematicsSettings::Cartesian,
-        axes: vec![
-            axis("X", AxisKind::Linear, 1, Some(drive.clone())),
-            axis("Y", AxisKind::Linear, 2, None),
-            axis("C", AxisKind::Rotary, 6, Some(drive)),
-        ],
+    let mut sets = vec!["cycle.f_s=0.25".to_owned(), "axes.Z.index=6".to_owned(), "axes.Z.machine_axis=AX6".to_owned()];
+    for axis in ["X", "Y", "Z"] {
+        sets.extend(["speed", "current"].map(|cycle| format!("axes.{axis}.drive.{cycle}_cycle_us=250")));
     }
+    let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+    let mut machine = test_machine::shipped("spinner_mvc850", &sets);
+    machine.axes[1].drive = None;
+    (machine.axes[2].name, machine.axes[2].kind) = ("C".to_owned(), AxisKind::Rotary);
+    machine
 }
 
 pub fn programs() -> Vec<OpenedProgram> {
