@@ -40,7 +40,7 @@ fn plan(criterion: &mut Criterion) {
                 |paths| {
                     let mut planner = Planner::new(&machine);
                     for path in paths {
-                        planner.push(path);
+                        planner.push(path).unwrap();
                         while let Some(piece) = planner.pop() {
                             black_box(piece);
                         }

@@ -235,3 +235,26 @@ fn an_outside_load_moves_an_axis_only_against_its_friction() {
     assert_eq!(deviation(0.3), 0.0);
     assert!(deviation(3.0) > 1e-4);
 }
+
+/// Machine files are checked, so that no program of a user gets here: an axis without acceleration comes from a machine made by hand.
+#[test]
+fn a_motion_without_a_speed_is_an_alarm_and_nothing_jumps_over_it() {
+    let mut machine = machine("spinner_mvc850", &[]).machine;
+    let z = machine.axis_by_name("Z").unwrap();
+    machine.axes[z.index()].limits.acceleration_max_lu_s2 = 0.0;
+    let text = "G642 CTOL=0.1\nG1 X10 F2000\nX20 Y5\nX30 Z5\nX40 M8\nX50 Y30\nX=1/0\nM30\n";
+    let mut kernel = Kernel::new(Arc::new(machine), program(text), false);
+    let mut last = [0.0; 3];
+    let mut steps_mm = 0.0_f64;
+    while kernel.cycle().unwrap() == Status::Running {
+        let setpoint = kernel.output().setpoint.unwrap();
+        let now = [0, 1, 2].map(|i| setpoint.axes.as_slice()[i].position_lu);
+        steps_mm = (0..3).fold(steps_mm, |most, i| most.max((now[i] - last[i]).abs()));
+        last = now;
+    }
+    assert!(steps_mm < 0.05, "a jump of {steps_mm} mm");
+    // The blend into the refused block is refused too: the path ends where it would begin, within T of the corner.
+    assert!((last[0] - 20.0).hypot(last[1] - 5.0) < 1.0 && last[2] == 0.0, "{last:?}");
+    let alarm = kernel.take_findings().alarm.expect("an alarm");
+    assert_eq!((alarm.code, alarm.line()), ("P0001", 3), "{alarm:?}");
+}

@@ -43,7 +43,6 @@ pub struct Planner {
     last: Option<Ends>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
-    warnings: Vec<Diagnostic>,
 }
 
 /// A piece in the window or before it.
@@ -103,24 +102,26 @@ impl Planner {
             entry: STOP,
             last: None,
             half_blend_lu: 0.0,
-            warnings: Vec::new(),
         }
     }
 
-    /// The next piece of the path.
-    pub fn push(&mut self, path: JointPath) {
+    /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken, and no
+    /// other may follow. What was pushed before comes to rest at its end after [`Planner::finish`].
+    pub fn push(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
         let contour = &path.contour;
         let mut rests_after = contour.stop_at_end;
         let mut corner = FREE;
         let motion = match &contour.kind {
-            PieceKind::Block(curve) | PieceKind::Blend(curve, _) if curve.length_lu() > 0.0 => {
+            // A length that is no number is not 0 either.
+            PieceKind::Block(curve) | PieceKind::Blend(curve, _) if curve.length_lu() != 0.0 => {
                 let length_lu = curve.length_lu();
                 let blend = matches!(contour.kind, PieceKind::Blend(..));
                 let (start, end) = (path.at(0.0), path.at(length_lu));
                 let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
                 corner = self.last.map_or(STOP, |before| junction::cap(&self.rules, &before, &ends));
-                self.last = Some(ends);
                 let limits = self.rules.piece(contour, curve, &ends);
+                check_numbers(&limits, length_lu, &path)?;
+                self.last = Some(ends);
                 Motion::Moves { limits, length_lu, block_length_lu: (!blend).then_some(length_lu) }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
@@ -129,11 +130,11 @@ impl Planner {
             }
             _ => Motion::Nothing,
         };
-        let motion = self.checked(motion, &path);
         if rests_after {
             self.last = None;
         }
         self.entries.push_back(Entry { path, motion, corner, rests_after, entry: REST });
+        Ok(())
     }
 
     /// No more pieces: the path ends at rest.
@@ -166,33 +167,6 @@ impl Planner {
             self.rests -= usize::from(next.rests_before());
         }
         Some(piece)
-    }
-
-    /// What was found since the last call.
-    pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
-        std::mem::take(&mut self.warnings)
-    }
-
-    /// A motion whose limits are numbers; else nothing, with an error. Checked machines and programs do not give any.
-    fn checked(&mut self, motion: Motion, path: &JointPath) -> Motion {
-        let Motion::Moves { limits, length_lu, .. } = &motion else { return motion };
-        let Bounds { dynamics, .. } = &limits.bounds;
-        let numbers = [
-            *length_lu,
-            limits.cap.velocity_lu_s,
-            limits.ramp_cap.velocity_lu_s,
-            dynamics.acceleration_lu_s2,
-            dynamics.jerk_lu_s3.unwrap_or(1.0),
-        ];
-        if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
-            return motion;
-        }
-        let line = path.contour.block.line;
-        self.warnings.push(
-            Diagnostic::error("F0001", format!("the motion of line {line} has no speed that every axis allows"))
-                .help("look for coordinates far outside the machine, or a curve with a cusp"),
-        );
-        Motion::Nothing
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.
@@ -352,4 +326,26 @@ impl Motion {
             Self::Nothing => exit,
         }
     }
+}
+
+/// The alarm of a motion whose length or limits are not numbers: without them there is no law, and to leave the piece out would make
+/// the axes jump over it. Checked machines and programs within their bounds do not give any.
+fn check_numbers(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+    let dynamics = &limits.bounds.dynamics;
+    let numbers = [
+        length_lu,
+        limits.cap.velocity_lu_s,
+        limits.ramp_cap.velocity_lu_s,
+        dynamics.acceleration_lu_s2,
+        dynamics.jerk_lu_s3.unwrap_or(1.0),
+    ];
+    if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
+        return Ok(());
+    }
+    let line = path.contour.block.line;
+    let message = format!("the motion of line {line} has no speed that every axis allows");
+    Err(Box::new(
+        Diagnostic::error("P0001", message)
+            .help("look for coordinates far outside the machine, or a circle of hardly any radius"),
+    ))
 }

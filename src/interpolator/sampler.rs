@@ -71,7 +71,7 @@ struct Active {
     piece: PlannedPiece,
     length_lu: f64,
     rotary_only: bool,
-    /// Tick number at or after its start, and how long after.
+    /// Tick number at or after its start, and how long after (a piece that takes no time: or a rounding error before it).
     entry_k: u64,
     carry_s: f64,
     /// At its start.
@@ -111,10 +111,11 @@ impl Interpolator {
             if left_s > self.tolerance_s(k) {
                 return Some(self.setpoint(k, active, active.piece.law.at(time_s)));
             }
-            // A next piece that begins up to the tolerance after the tick is only looked at, not begun.
+            // A next piece that begins up to the tolerance after the tick is only looked at, not begun; one that takes no time
+            // (M30 at the end) does not ask for a cycle of its own.
             let following = self.next.take().or_else(&mut *next);
             match following {
-                Some(piece) if left_s > 0.0 => {
+                Some(piece) if left_s > 0.0 && !takes_no_time(&piece) => {
                     self.next = Some(piece);
                     let active = self.active.as_ref()?;
                     return Some(self.setpoint(k, active, active.piece.law.at(time_s)));
@@ -177,7 +178,7 @@ impl Interpolator {
             displacement_lu: contour.curve().map_or(AxisVector::zero(), |curve| curve.end().0 - curve.start().0),
             rotary_only,
             duration_s: piece.law.duration_s(),
-            before_tick_s: carry_s,
+            before_tick_s: carry_s.max(0.0),
             path_length_mm: self.path_length_mm,
         });
         let path_length_mm = self.path_length_mm;
@@ -227,6 +228,11 @@ impl Active {
             self.piece.law.phases().last().map_or(Limit { kind: LimitKind::Feed, axis: None }, |last| last.limit);
         PathState { position_lu: self.length_lu, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
     }
+}
+
+/// A wait of 0 s: a function block.
+fn takes_no_time(piece: &PlannedPiece) -> bool {
+    piece.path.contour.curve().is_none() && piece.law.duration_s() == 0.0
 }
 
 /// F of a piece that moves with one.

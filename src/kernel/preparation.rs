@@ -1,8 +1,8 @@
 //! Program to planned pieces: the stages that run ahead of the cycle, chained.
 //!
 //! In: a program and a machine. Out: [`PlannedPiece`]s in order, final. How far it is ahead of the cycle is counted in blocks by the
-//! planner, never in time, so that threads change nothing. An alarm of the interpreter stops preparation; everything before it is
-//! planned to rest and handed out first, as on the control.
+//! planner, never in time, so that threads change nothing. An alarm of the interpreter or of feed stops preparation; everything before
+//! it is planned to rest and handed out first, as on the control.
 
 use crate::base::Diagnostic;
 use crate::base::diagnostics::Place;
@@ -11,7 +11,7 @@ use crate::interpreter::Interpreter;
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
 use crate::program::ProgramSource;
-use crate::smoothing::Smoother;
+use crate::smoothing::{ContourPiece, Smoother};
 
 /// Longest time of one block: the 11 days are beyond any program, and a recording of them is beyond any disk.
 const BLOCK_TIME_MAX_S: f64 = 1e6;
@@ -65,15 +65,31 @@ impl Preparation {
 
     /// Executes one more block of the program and plans what follows from it.
     fn extend(&mut self) {
-        let Self { interpreter, smoother, kinematics, planner, .. } = self;
-        match interpreter.next_move() {
-            Ok(Some(next)) => smoother.push(next, &mut |piece| planner.push(kinematics.to_joint(piece))),
+        let moved = self.interpreter.next_move();
+        let Self { smoother, kinematics, planner, .. } = self;
+        let mut refused = None;
+        let mut plan = |piece: ContourPiece| {
+            // Nothing may follow a piece that was refused: the axes would jump over it.
+            if refused.is_none() {
+                let block = piece.block;
+                refused = planner.push(kinematics.to_joint(piece)).err().map(|alarm| (block, alarm));
+            }
+        };
+        match moved {
+            Ok(Some(next)) => smoother.push(next, &mut plan),
             ended => {
                 self.alarm = ended.err().map(|alarm| *alarm);
-                smoother.finish(&mut |piece| planner.push(kinematics.to_joint(piece)));
-                planner.finish();
                 self.finished = true;
+                smoother.finish(&mut plan);
             }
+        }
+        if let Some((block, alarm)) = refused {
+            // It stands before any alarm of the interpreter, which is ahead.
+            self.alarm = Some(self.smoother.marked(*alarm, block));
+            self.finished = true;
+        }
+        if self.finished {
+            self.planner.finish();
         }
     }
 }
@@ -123,7 +139,6 @@ impl PieceSource for Preparation {
     fn take_findings(&mut self) -> Findings {
         let mut warnings = self.interpreter.take_warnings();
         warnings.extend(self.smoother.take_warnings());
-        warnings.extend(self.planner.take_warnings());
         Findings { warnings, alarm: self.alarm.take() }
     }
 }

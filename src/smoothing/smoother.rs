@@ -12,6 +12,7 @@
 use super::corner::{Junction, Rules, Side};
 use super::unrounded::Unrounded;
 use super::{ContourPiece, PieceKind};
+use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, PartPoint};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
 use crate::interpreter::{Event, Feed, Modes, Move, MoveKind};
@@ -91,9 +92,18 @@ impl Smoother {
         self.unrounded.take()
     }
 
+    /// An alarm of a later stage, with the line of its block marked.
+    pub fn marked(&self, alarm: Diagnostic, block: BlockRef) -> Diagnostic {
+        match self.unrounded.place(block) {
+            Some(place) => alarm.at(Place { label: "this motion".to_owned(), ..place }),
+            None => alarm,
+        }
+    }
+
     fn push_motion(&mut self, next: Move, curve: Curve, out: &mut impl FnMut(ContourPiece)) {
         let length_lu = curve.length_lu();
-        if !(length_lu.is_finite() && length_lu >= DISPLACEMENT_MIN_LU) {
+        // A length that is no number goes on: feed makes an alarm of it. To leave it out would make the axes jump.
+        if length_lu < DISPLACEMENT_MIN_LU {
             if next.modes.path_mode == PathMode::ExactStop {
                 self.rest(out);
             }

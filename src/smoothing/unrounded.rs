@@ -52,7 +52,8 @@ impl Unrounded {
         std::mem::take(&mut self.warnings)
     }
 
-    fn place(&self, block: BlockRef) -> Option<Place> {
+    /// The line of a block, marked.
+    pub(super) fn place(&self, block: BlockRef) -> Option<Place> {
         let program = self.programs.iter().rev().find(|program| program.id == block.program)?;
         let line = program.bytes.split(|byte| *byte == b'\n').nth((block.line as usize).checked_sub(1)?)?;
         let line_text = String::from_utf8_lossy(line).trim_end().to_owned();

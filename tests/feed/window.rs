@@ -43,7 +43,7 @@ fn pieces_beyond_the_window_are_not_seen() {
         let one_by_one = program.planned(&machine);
         let mut planner = Planner::new(&machine);
         for path in program.paths(&machine) {
-            planner.push(path);
+            planner.push(path).unwrap();
         }
         let early: Vec<PlannedPiece> = std::iter::from_fn(|| planner.pop()).collect();
         planner.finish();
@@ -68,7 +68,7 @@ fn a_piece_waits_for_a_full_window() {
     let (mut known, mut fixed) = (0, 0);
     for path in paths {
         known += path.contour.blocks_begun;
-        planner.push(path);
+        planner.push(path).unwrap();
         while let Some(piece) = planner.pop() {
             fixed += piece.path.contour.blocks_begun;
             assert_eq!(piece.buffered_blocks, 8);
@@ -89,7 +89,7 @@ fn it_can_always_stop_inside_the_window() {
             let mut paths = paths.into_iter();
             for _ in 0..paths.len() / 2 {
                 if let Some(path) = paths.next() {
-                    planner.push(path);
+                    planner.push(path).unwrap();
                 }
                 while planner.pop().is_some() {}
             }
@@ -155,7 +155,7 @@ fn the_kept_speeds_are_those_of_a_pass_from_scratch() {
         let mut kept = Planner::new(&machine);
         let mut popped = 0;
         for (i, path) in paths.iter().enumerate() {
-            kept.push(path.clone());
+            kept.push(path.clone()).unwrap();
             while kept.pop().is_some() {
                 popped += 1;
             }
@@ -165,7 +165,7 @@ fn the_kept_speeds_are_those_of_a_pass_from_scratch() {
             };
             let mut fresh = Planner::new(&machine);
             for path in &paths[..=i] {
-                fresh.push(path.clone());
+                fresh.push(path.clone()).unwrap();
             }
             let (a, b) = (rest(kept.clone()), rest(fresh));
             for (a, b) in a.iter().zip(&b[popped..]) {
@@ -230,12 +230,12 @@ fn a_clone_goes_on_the_same() {
     let paths: Vec<JointPath> = program.paths(&machine);
     let mut planner = Planner::new(&machine);
     for path in &paths[..20] {
-        planner.push(path.clone());
+        planner.push(path.clone()).unwrap();
     }
     while planner.pop().is_some() {}
     let finish = |mut planner: Planner| {
         for path in &paths[20..] {
-            planner.push(path.clone());
+            planner.push(path.clone()).unwrap();
         }
         planner.finish();
         std::iter::from_fn(move || planner.pop()).collect::<Vec<_>>()
