@@ -33,6 +33,11 @@ impl Failure {
         Self { code: UNREADABLE, findings: vec![finding], told: false }
     }
 
+    /// Wrong arguments on the command line.
+    pub(super) fn wrong_usage(findings: Vec<Diagnostic>) -> Self {
+        Self { code: UNREADABLE, findings, told: false }
+    }
+
     /// The work found something wrong, and has said so in its own document.
     pub(super) fn told() -> Self {
         Self { code: FOUND_WRONG, findings: Vec::new(), told: true }

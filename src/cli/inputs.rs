@@ -53,6 +53,10 @@ impl MachineChoice {
 pub(super) fn refused(error: LoadError) -> Failure {
     match error {
         LoadError::Unreadable(finding) => Failure::unreadable(finding),
+        // A bad --set is a fault of the command line, not of the machine file.
+        LoadError::Invalid(findings) if findings.iter().all(|finding| finding.code == "M0010") => {
+            Failure::wrong_usage(findings)
+        }
         LoadError::Invalid(findings) => Failure::found_wrong(findings),
     }
 }

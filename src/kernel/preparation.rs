@@ -5,16 +5,12 @@
 //! it is planned to rest and handed out first, as on the control.
 
 use crate::base::Diagnostic;
-use crate::base::diagnostics::Place;
 use crate::feed::{PlannedPiece, Planner};
 use crate::interpreter::Interpreter;
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
 use crate::program::ProgramSource;
 use crate::smoothing::{ContourPiece, Smoother};
-
-/// Longest time of one block: the 11 days are beyond any program, and a recording of them is beyond any disk.
-const BLOCK_TIME_MAX_S: f64 = 1e6;
 
 /// Where the cycle gets its pieces from: preparation itself, or a channel to the thread it runs on.
 pub trait PieceSource {
@@ -41,25 +37,20 @@ pub struct Preparation {
     smoother: Smoother,
     kinematics: Kinematics,
     planner: Planner,
-    program: ProgramSource,
     alarm: Option<Diagnostic>,
     finished: bool,
-    /// A block was refused: nothing after it is handed out.
-    refused: bool,
 }
 
 impl Preparation {
     /// At the start of `program`, axes at home.
     pub fn new(program: ProgramSource, machine: &Machine) -> Self {
         Self {
-            interpreter: Interpreter::new(program.clone(), machine),
+            interpreter: Interpreter::new(program, machine),
             smoother: Smoother::new(machine),
             kinematics: Kinematics::new(machine),
             planner: Planner::new(machine),
-            program,
             alarm: None,
             finished: false,
-            refused: false,
         }
     }
 
@@ -94,40 +85,11 @@ impl Preparation {
     }
 }
 
-impl Preparation {
-    /// The alarm of a block that takes for ever: a feed of 1e-7 mm/min, a position of 1e15 mm, a slip in a dwell.
-    fn too_long(&self, piece: &PlannedPiece) -> Diagnostic {
-        let block = piece.path.contour.block;
-        let message =
-            format!("the block in line {} takes {:.3e} s, more than 11 days", block.line, piece.law.duration_s());
-        let finding = Diagnostic::error("K0006", message)
-            .help("check its feed, its end position and its dwell, and the velocity limits of the machine");
-        // Sub-programs are not opened yet: every block is one of the main program.
-        let mut cursor = self.program.first();
-        while cursor.line < block.line
-            && let Some((_, next)) = self.program.line_bytes(cursor)
-        {
-            cursor = next;
-        }
-        let line_text = self.program.line_text(cursor).into_owned();
-        let (file, columns) = (self.program.shared_name(), 0..line_text.len());
-        finding.at(Place { file, line: block.line, line_text, columns, label: "takes this long".to_owned() })
-    }
-}
-
 impl PieceSource for Preparation {
     fn next_piece(&mut self) -> Option<PlannedPiece> {
         loop {
-            if self.refused {
-                return None;
-            }
             if let Some(piece) = self.planner.pop() {
-                if piece.law.duration_s() <= BLOCK_TIME_MAX_S {
-                    return Some(piece);
-                }
-                self.refused = true;
-                self.alarm = Some(self.too_long(&piece));
-                return None;
+                return Some(piece);
             }
             if self.finished {
                 return None;
