@@ -170,6 +170,18 @@ fn windows_1252(byte: u8) -> char {
     }
 }
 
+/// Bytes looked at to tell text from data.
+const HEAD_BYTES: usize = 4096;
+
+/// What a file is that cannot be an NC program, and what to do: text in two-byte characters, or no text at all.
+fn no_program(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Some(("UTF-16 text", "save it as UTF-8, Latin-1 or Windows-1252"));
+    }
+    let head = &bytes[..bytes.len().min(HEAD_BYTES)];
+    head.contains(&0).then_some(("no text: it holds zero bytes", "give the path of an NC program"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -183,16 +195,4 @@ mod tests {
             assert_eq!(find_byte(&text, b'\n'), length);
         }
     }
-}
-
-/// Bytes looked at to tell text from data.
-const HEAD_BYTES: usize = 4096;
-
-/// What a file is that cannot be an NC program, and what to do: text in two-byte characters, or no text at all.
-fn no_program(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
-    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
-        return Some(("UTF-16 text", "save it as UTF-8, Latin-1 or Windows-1252"));
-    }
-    let head = &bytes[..bytes.len().min(HEAD_BYTES)];
-    head.contains(&0).then_some(("no text: it holds zero bytes", "give the path of an NC program"))
 }
