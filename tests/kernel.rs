@@ -205,6 +205,8 @@ fn a_table_of_setpoints_is_refused_with_the_place() {
     assert_eq!((finding.line(), finding.message.contains("abc")), (3, true));
     let finding = read("time_s,X_mm\n0,1\n0.005,2\n").unwrap_err();
     assert!(finding.line() == 3 && finding.message.contains("0.001"), "{finding:?}");
+    let finding = read("time_s;X_mm\n0;1,5\n").unwrap_err();
+    assert!(finding.line() == 1 && finding.message.contains("`;`"), "{finding:?}");
     let finding = read("time_s,Q_mm\n0,1\n").unwrap_err();
     assert!(finding.line() == 1 && finding.message.contains("Q_mm"), "{finding:?}");
     assert!(read("time_s,X_mm\n").is_err());

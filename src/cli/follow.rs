@@ -2,10 +2,10 @@
 //!
 //! In: a CSV or a recording, machine. Out: a recording, figures. Does not plan, interpolate or resample.
 
+use super::failure::Failure;
 use super::inputs::{MachineChoice, default_recording, refuse_same_file};
 use super::output::{print, print_json, show};
 use super::run::parse_signals;
-use super::{FOUND_WRONG, UNREADABLE};
 use crate::base::{Diagnostic, SourceText};
 use crate::drive::Start;
 use crate::kernel::{FollowOptions, FollowOutcome, SetpointTable, follow as follow_setpoints};
@@ -38,7 +38,7 @@ pub(super) struct FollowArguments {
     record_precision: Option<u8>,
     /// One JSON document on stdout
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -47,13 +47,13 @@ enum StartChoice {
     Cold,
 }
 
-pub(super) fn follow(arguments: &FollowArguments) -> Result<(), u8> {
+pub(super) fn follow(arguments: &FollowArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load()?;
     let recording = arguments.output.clone().unwrap_or_else(|| {
         let stem = default_recording(&arguments.setpoints).with_extension("");
         PathBuf::from(format!("{}_followed.mcap", stem.display()))
     });
-    refuse_same_file(&arguments.setpoints, &recording)?;
+    refuse_same_file([arguments.setpoints.as_path()].into_iter().chain(arguments.machine.path()), &recording)?;
     let signals = parse_signals(arguments.record.as_deref(), &machine)?;
     let table = read_setpoints(&arguments.setpoints, &machine)?;
     let options = FollowOptions {
@@ -66,46 +66,42 @@ pub(super) fn follow(arguments: &FollowArguments) -> Result<(), u8> {
         signals,
         mantissa_bits: arguments.record_precision,
     };
-    let outcome = follow_setpoints(&table, &options).map_err(|finding| {
-        show([&finding]);
-        UNREADABLE
-    })?;
+    let outcome = follow_setpoints(&table, &options).map_err(Failure::unreadable)?;
     report(&outcome, &recording, arguments.json)
 }
 
-fn report(outcome: &FollowOutcome, recording: &Path, json: bool) -> Result<(), u8> {
+fn report(outcome: &FollowOutcome, recording: &Path, json: bool) -> Result<(), Failure> {
     show(&outcome.warnings);
     if json {
         let mut document = outcome.summary.clone();
         document["recording"] = serde_json::json!(recording.display().to_string());
-        print_json(&document);
+        print_json(&document)?;
     } else {
-        print(&format!("{} rows followed: {}\n", outcome.rows, recording.display()));
+        print(&format!("{} rows followed: {}\n", outcome.rows, recording.display()))?;
     }
     match &outcome.alarm {
         Some(alarm) => {
             show([alarm]);
-            Err(FOUND_WRONG)
+            Err(Failure::told())
         }
         None => Ok(()),
     }
 }
 
 /// A CSV, or the position set-points of a recording.
-fn read_setpoints(path: &Path, machine: &Loaded) -> Result<SetpointTable, u8> {
-    let refuse = |finding: Diagnostic| {
-        show([&finding]);
-        if path.exists() { FOUND_WRONG } else { UNREADABLE }
-    };
+fn read_setpoints(path: &Path, machine: &Loaded) -> Result<SetpointTable, Failure> {
     let name = path.display().to_string();
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
-        let recording = Recording::open(path).map_err(refuse)?;
-        return SetpointTable::from_recording(&recording, &machine.machine).map_err(refuse);
+        let recording = Recording::open(path).map_err(Failure::unreadable)?;
+        return SetpointTable::from_recording(&recording, &machine.machine).map_err(Failure::unreadable);
     }
     let bytes = std::fs::read(path)
-        .map_err(|error| refuse(Diagnostic::error("F0009", format!("cannot read `{name}`: {error}"))))?;
+        .map_err(|error| Failure::unreadable(Diagnostic::error("F0009", format!("cannot read `{name}`: {error}"))))?;
     let text = String::from_utf8(bytes).map_err(|_| {
-        refuse(Diagnostic::error("F0010", format!("`{name}` is not UTF-8 text")).help("save the CSV as UTF-8"))
+        Failure::unreadable(
+            Diagnostic::error("F0010", format!("`{name}` is not UTF-8 text")).help("save the CSV as UTF-8"),
+        )
     })?;
-    SetpointTable::from_csv(&SourceText::new(name, text), &machine.machine).map_err(refuse)
+    SetpointTable::from_csv(&SourceText::new(name, text), &machine.machine)
+        .map_err(|finding| Failure::found_wrong(vec![finding]))
 }

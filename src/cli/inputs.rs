@@ -2,8 +2,8 @@
 //!
 //! In: `-m`, `--set`, paths. Out: machine and program, or findings on stderr and an exit code. Does not run anything.
 
+use super::failure::Failure;
 use super::output::show;
-use super::{FOUND_WRONG, UNREADABLE};
 use crate::base::Diagnostic;
 use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, load, unsupported};
 use crate::program::ProgramSource;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// `-m` and `--set`.
 #[derive(Args)]
 pub(super) struct MachineChoice {
-    /// Machine file, or the name of a shipped machine
+    /// Machine file, or the name of a shipped machine; default: spinner_mvc850, a three-axis mill
     #[arg(short, long, value_name = "MACHINE")]
     machine: Option<String>,
     /// Change one value for this run, such as axes.X.drive.velocity_feedforward=0.95
@@ -23,7 +23,7 @@ pub(super) struct MachineChoice {
 
 impl MachineChoice {
     /// Loads the machine; findings are shown, errors end with their exit code.
-    pub(super) fn load(&self) -> Result<Loaded, u8> {
+    pub(super) fn load(&self) -> Result<Loaded, Failure> {
         let name = match &self.machine {
             Some(name) => name.as_str(),
             None => {
@@ -33,50 +33,76 @@ impl MachineChoice {
                 DEFAULT_MACHINE
             }
         };
-        load(name, &self.sets).map_err(|error| match error {
-            LoadError::Unreadable(finding) => {
-                show([&finding]);
-                UNREADABLE
-            }
-            LoadError::Invalid(findings) => {
-                show(&findings);
-                FOUND_WRONG
-            }
-        })
+        load(name, &self.sets).map_err(refused)
+    }
+
+    /// The machine file, if it is one that can be overwritten.
+    pub(super) fn path(&self) -> Option<&Path> {
+        self.machine.as_deref().map(Path::new)
     }
 
     /// As `load`, and refuses by name what this version cannot simulate yet.
-    pub(super) fn load_to_run(&self) -> Result<Loaded, u8> {
+    pub(super) fn load_to_run(&self) -> Result<Loaded, Failure> {
         let loaded = self.load()?;
         let refused = unsupported(&loaded.machine);
-        if refused.is_empty() {
-            return Ok(loaded);
-        }
-        show(&refused);
-        Err(FOUND_WRONG)
+        if refused.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(refused)) }
     }
 }
 
-/// Opens a program.
-pub(super) fn open_program(path: &Path) -> Result<ProgramSource, u8> {
-    ProgramSource::from_file(path).map_err(|finding| {
-        show([&finding]);
-        UNREADABLE
-    })
+/// A machine that is not there.
+pub(super) fn refused(error: LoadError) -> Failure {
+    match error {
+        LoadError::Unreadable(finding) => Failure::unreadable(finding),
+        // A bad --set is a fault of the command line, not of the machine file.
+        LoadError::Invalid(findings) if findings.iter().all(|finding| finding.code == "M0010") => {
+            Failure::wrong_usage(findings)
+        }
+        LoadError::Invalid(findings) => Failure::found_wrong(findings),
+    }
 }
 
-/// An output must not be the input: opening it would destroy what is to be read.
-pub(super) fn refuse_same_file(input: &Path, output: &Path) -> Result<(), u8> {
-    let same = match (input.canonicalize(), output.canonicalize()) {
-        (Ok(input), Ok(output)) => input == output,
-        _ => input == output,
-    };
-    if same {
+/// The shipped programs; inside the binary, so that an installed `sollwert` works in an empty folder.
+pub(super) const SHIPPED_PROGRAMS: &[(&str, &str)] = &[
+    ("circle.mpf", include_str!("../../programs/circle.mpf")),
+    ("corners.mpf", include_str!("../../programs/corners.mpf")),
+    ("pocket.mpf", include_str!("../../programs/pocket.mpf")),
+    ("spline.mpf", include_str!("../../programs/spline.mpf")),
+];
+
+/// Opens a program, or a shipped one by its name where no file of that name exists.
+pub(super) fn open_program(path: &Path) -> Result<ProgramSource, Failure> {
+    if !path.exists()
+        && let Some((name, text)) = SHIPPED_PROGRAMS
+            .iter()
+            .find(|(name, _)| Path::new(name) == path || path == Path::new(name).with_extension(""))
+    {
+        return Ok(ProgramSource::from_bytes(name, text.as_bytes()));
+    }
+    ProgramSource::from_file(path).map_err(Failure::unreadable)
+}
+
+/// An output must not be an input: opening it would destroy what is to be read.
+pub(super) fn refuse_same_file<'a>(inputs: impl IntoIterator<Item = &'a Path>, output: &Path) -> Result<(), Failure> {
+    if inputs.into_iter().any(|input| is_same_file(input, output)) {
         let finding = Diagnostic::error("C0001", format!("`{}` is both input and output", output.display()));
-        show([&finding.help("give another name to -o")]);
-        return Err(UNREADABLE);
+        return Err(Failure::unreadable(finding.help("give another name to -o")));
     }
     Ok(())
+}
+
+/// Two names of one file: the same path, a link, or a second hard link.
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        if let (Ok(one), Ok(other)) = (one.metadata(), other.metadata()) {
+            return (one.dev(), one.ino()) == (other.dev(), other.ino());
+        }
+    }
+    match (one.canonicalize(), other.canonicalize()) {
+        (Ok(one), Ok(other)) => one == other,
+        _ => one == other,
+    }
 }
 
 /// `x.mpf` -> `x.mcap` in the current folder.

@@ -2,9 +2,9 @@
 //!
 //! In: a machine file or the name of a shipped one. Out: verdict, overview, schema or text. Does not run anything.
 
-use super::inputs::MachineChoice;
+use super::failure::Failure;
+use super::inputs::{MachineChoice, refused};
 use super::output::{print, print_json, show, table};
-use super::{FOUND_WRONG, UNREADABLE};
 use crate::base::{AxisKind, Diagnostic, units};
 use crate::machine::{Axis, LoadError, Loaded, load, schema, shipped};
 use clap::{Args, Subcommand};
@@ -31,8 +31,14 @@ enum Action {
         json: bool,
     },
     /// The JSON Schema of machine files, for editors
-    Schema,
+    #[command(after_help = "Example:\n  sollwert machine schema > machine.schema.json")]
+    Schema {
+        /// Accepted as everywhere: a schema is JSON anyway
+        #[arg(long)]
+        json: bool,
+    },
     /// The shipped machines
+    #[command(after_help = "Example:\n  sollwert machine list")]
     List {
         /// One JSON document on stdout
         #[arg(long)]
@@ -43,48 +49,56 @@ enum Action {
     Show {
         #[command(flatten)]
         machine: MachineChoice,
+        /// One JSON document on stdout, with the text in it
+        #[arg(long)]
+        json: bool,
     },
 }
 
-pub(super) fn machine(arguments: &MachineArguments) -> Result<(), u8> {
-    match &arguments.action {
-        Action::Check { machine, sets, json } => check(machine, sets, *json),
-        Action::Schema => {
-            print_json(&schema());
-            Ok(())
-        }
-        Action::List { json } => list(*json),
-        Action::Show { machine } => {
-            print(&machine.load()?.text_as_used);
-            Ok(())
+impl MachineArguments {
+    /// Whether a JSON document is wanted.
+    pub(super) fn json(&self) -> bool {
+        match &self.action {
+            Action::Check { json, .. }
+            | Action::Schema { json }
+            | Action::List { json }
+            | Action::Show { json, .. } => *json,
         }
     }
 }
 
-fn check(name: &str, sets: &[String], json: bool) -> Result<(), u8> {
+pub(super) fn machine(arguments: &MachineArguments) -> Result<(), Failure> {
+    match &arguments.action {
+        Action::Check { machine, sets, json } => check(machine, sets, *json),
+        Action::Schema { .. } => print_json(&schema()),
+        Action::List { json } => list(*json),
+        Action::Show { machine, json } => {
+            let loaded = machine.load()?;
+            if *json {
+                print_json(&json!({"format": 1, "machine": loaded.machine.name, "text": loaded.text_as_used}))
+            } else {
+                print(&loaded.text_as_used)
+            }
+        }
+    }
+}
+
+fn check(name: &str, sets: &[String], json: bool) -> Result<(), Failure> {
     match load(name, sets) {
         Ok(loaded) => {
             show(&loaded.warnings);
-            if json {
-                print_json(&verdict(name, &[], &loaded.warnings));
-            } else {
-                print(&overview(&loaded));
-            }
-            Ok(())
-        }
-        Err(LoadError::Unreadable(finding)) => {
-            show([&finding]);
-            Err(UNREADABLE)
+            if json { print_json(&verdict(name, &[], &loaded.warnings)) } else { print(&overview(&loaded)) }
         }
         Err(LoadError::Invalid(findings)) => {
             show(&findings);
             if json {
-                print_json(&verdict(name, &findings, &[]));
+                print_json(&verdict(name, &findings, &[]))?;
             } else {
-                print(&format!("{name}: {} to mend\n", findings.len()));
+                print(&format!("{name}: {} to mend\n", findings.len()))?;
             }
-            Err(FOUND_WRONG)
+            Err(Failure::told())
         }
+        Err(error) => Err(refused(error)),
     }
 }
 
@@ -135,7 +149,7 @@ fn axis_row(axis: &Axis) -> Vec<String> {
     [axis.name.clone()].into_iter().chain(numbers).chain([drive.to_owned()]).collect()
 }
 
-fn list(as_json: bool) -> Result<(), u8> {
+fn list(as_json: bool) -> Result<(), Failure> {
     let mut rows = Vec::new();
     for (name, _) in shipped() {
         match load(name, &[]) {
@@ -150,11 +164,10 @@ fn list(as_json: bool) -> Result<(), u8> {
     if as_json {
         let list: Vec<_> =
             rows.iter().map(|(name, title, axes)| json!({"name": name, "title": title, "axes": axes})).collect();
-        print_json(&json!({"format": 1, "machines": list}));
+        print_json(&json!({"format": 1, "machines": list}))
     } else {
         print(&table(
             &rows.into_iter().map(|(name, title, axes)| vec![name.to_owned(), title, axes]).collect::<Vec<_>>(),
-        ));
+        ))
     }
-    Ok(())
 }

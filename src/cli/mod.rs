@@ -1,11 +1,12 @@
 //! The command. One file per sub-command: read arguments, call one library function, print.
 //!
 //! In: command line. Out: tables or one JSON document on stdout, findings and progress on stderr, exit code 0 (done), 1 (the work
-//! found something wrong) or 2 (wrong usage, unreadable input). No physics here.
+//! found something wrong) or 2 (wrong usage, unreadable input, output that cannot be written). No physics here.
 
 mod check;
 mod demo;
 mod export;
+mod failure;
 mod follow;
 mod inputs;
 mod machine;
@@ -17,11 +18,6 @@ mod time;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
-
-/// Exit code 1: the work found something wrong.
-const FOUND_WRONG: u8 = 1;
-/// Exit code 2: wrong usage or unreadable input.
-const UNREADABLE: u8 = 2;
 
 /// A virtual NC kernel: replays SINUMERIK NC programs cycle by cycle on a machine's limits and records every signal.
 #[derive(Parser)]
@@ -35,13 +31,15 @@ struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  sollwert demo                                        write a program and a machine to look at, and run them
-  sollwert run part.mpf -m spinner_mvc850 -o part.mcap  replay, record everything
-  sollwert time part.mpf -m my_machine.toml            set-points only: cycle time, and what limits the feed
-  sollwert machine check my_machine.toml               is the machine file right?
+  sollwert demo                                          something to look at
+  sollwert run part.mpf -m spinner_mvc850 -o part.mcap   replay, record everything
+  sollwert time part.mpf -m my_machine.toml              what limits the feed
+  sollwert machine check my_machine.toml                 is the machine file right?
 
 -m takes a path or the name of a shipped machine; `sollwert machine list` names them.
-Exit codes: 0 done, 1 something is wrong with the program, machine or trace, 2 wrong usage or unreadable input.";
+--json prints one JSON document to stdout and nothing else there, also when the work fails.
+Exit codes: 0 done; 1 something is wrong with the program, the machine or the set-points;
+2 wrong usage, unreadable input, or output that cannot be written.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -71,19 +69,19 @@ pub fn main() -> ExitCode {
     if arguments.verbose {
         tracing_subscriber::fmt().with_writer(std::io::stderr).with_ansi(output::stderr_colour()).without_time().init();
     }
-    let code = match arguments.command {
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Time(arguments) => time::time(&arguments),
-        Command::Check(arguments) => check::check(&arguments),
-        Command::Moves(arguments) => moves::moves(&arguments),
-        Command::Follow(arguments) => follow::follow(&arguments),
-        Command::Export(arguments) => export::export(&arguments),
-        Command::Recover(arguments) => recover::recover(&arguments),
-        Command::Machine(arguments) => machine::machine(&arguments),
-        Command::Demo(arguments) => demo::demo(&arguments),
+    let (done, json) = match &arguments.command {
+        Command::Run(arguments) => (run::run(arguments), arguments.json),
+        Command::Time(arguments) => (time::time(arguments), arguments.json),
+        Command::Check(arguments) => (check::check(arguments), arguments.json),
+        Command::Moves(arguments) => (moves::moves(arguments), arguments.json),
+        Command::Follow(arguments) => (follow::follow(arguments), arguments.json),
+        Command::Export(arguments) => (export::export(arguments), arguments.json),
+        Command::Recover(arguments) => (recover::recover(arguments), arguments.json),
+        Command::Machine(arguments) => (machine::machine(arguments), arguments.json()),
+        Command::Demo(arguments) => (demo::demo(arguments), arguments.json),
     };
-    match code {
+    match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(code) => ExitCode::from(code),
+        Err(failure) => failure.tell(json),
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! In: program, machine. Out: one line or one JSON object a move, streamed. Does not smooth or plan.
 
-use super::FOUND_WRONG;
+use super::failure::Failure;
 use super::inputs::{MachineChoice, open_program};
-use super::output::show;
+use super::output::{show, written};
 use crate::base::{AxisKind, PartPoint, units};
 use crate::interpreter::{Interpreter, Listing, Move, MoveKind, feed_per_minute};
 use crate::machine::Machine;
@@ -22,32 +22,32 @@ pub(super) struct MovesArguments {
     machine: MachineChoice,
     /// One JSON document on stdout
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
-pub(super) fn moves(arguments: &MovesArguments) -> Result<(), u8> {
+pub(super) fn moves(arguments: &MovesArguments) -> Result<(), Failure> {
     let loaded = arguments.machine.load()?;
     let program = open_program(&arguments.program)?;
     let mut interpreter = Interpreter::new(program, &loaded.machine);
     let mut listing = Listing::new(&loaded.machine);
     // Streamed: the program may have ten million blocks. A closed pipe is the reader's way to say "enough".
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    let mut open = true;
+    let mut done = Ok(());
     let mut first = true;
     let mut start = home(&loaded.machine);
     if arguments.json {
-        open = out.write_all(b"{\"format\": 1, \"moves\": [").is_ok();
+        done = out.write_all(b"{\"format\": 1, \"moves\": [");
     }
     let alarm = loop {
         match interpreter.next_move() {
-            Ok(Some(next)) if open => {
+            Ok(Some(next)) if done.is_ok() => {
                 let text = if arguments.json {
                     let separator = if std::mem::take(&mut first) { "\n " } else { ",\n " };
                     format!("{separator}{}", json_of(&next, std::mem::replace(&mut start, next.end), &loaded.machine))
                 } else {
                     listing.line(&next) + "\n"
                 };
-                open = out.write_all(text.as_bytes()).is_ok();
+                done = out.write_all(text.as_bytes());
             }
             Ok(_) => break None,
             Err(alarm) => break Some(alarm),
@@ -56,19 +56,19 @@ pub(super) fn moves(arguments: &MovesArguments) -> Result<(), u8> {
     let warnings = interpreter.take_warnings();
     if arguments.json {
         let listed: Vec<Value> = warnings.iter().map(|finding| json!(crate::kernel::Warning::from(finding))).collect();
-        // Nothing is left to do when the reader has closed the pipe.
-        let _ = writeln!(out, "\n], \"warnings\": {}}}", Value::Array(listed));
+        let ended = alarm.as_ref().map_or(String::new(), |alarm| {
+            format!(", \"alarm\": {}", json!(crate::kernel::Warning::from(alarm.as_ref())))
+        });
+        done = done.and_then(|()| writeln!(out, "\n], \"warnings\": {}{ended}}}", Value::Array(listed)));
     }
-    let _ = out.flush();
+    done = done.and_then(|()| out.flush());
     drop(out);
     show(&warnings);
-    match alarm {
-        Some(alarm) => {
-            show([alarm.as_ref()]);
-            Err(FOUND_WRONG)
-        }
-        None => Ok(()),
+    if let Some(alarm) = &alarm {
+        show([alarm.as_ref()]);
     }
+    written(done)?;
+    if alarm.is_some() { Err(Failure::told()) } else { Ok(()) }
 }
 
 /// `feed_mm_min` is null for rapids, and deg/min where only rotary axes move.

@@ -2,6 +2,7 @@
 //!
 //! In: diagnostics, documents, rows. Out: text on stdout and stderr. A closed pipe (`sollwert moves x | head`) ends output quietly.
 
+use super::failure::Failure;
 use crate::base::Diagnostic;
 use serde::Serialize;
 use std::io::{IsTerminal, Write};
@@ -23,17 +24,25 @@ pub(super) fn stderr_colour() -> bool {
 }
 
 /// Prints a text to stdout.
-pub(super) fn print(text: &str) {
+pub(super) fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+    written(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// A closed pipe is the reader's way to say "enough"; any other fault of stdout is one.
+pub(super) fn written(done: std::io::Result<()>) -> Result<(), Failure> {
+    match done {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::stdout(&error)),
+        _ => Ok(()),
+    }
 }
 
 /// Prints one JSON document to stdout.
-pub(super) fn print_json(document: &impl Serialize) {
-    match serde_json::to_string_pretty(document) {
-        Ok(text) => print(&(text + "\n")),
-        Err(error) => show([&Diagnostic::error("K0003", format!("the figures do not serialise: {error}"))]),
-    }
+pub(super) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(document).map_err(|error| {
+        Failure::unreadable(Diagnostic::error("K0003", format!("the figures do not serialise: {error}")))
+    })?;
+    print(&(text + "\n"))
 }
 
 /// A table for people: columns padded to their widest cell; the first column left, the others right.

@@ -2,9 +2,9 @@
 //!
 //! In: a damaged recording. Out: a whole one, and what was rescued. Does not change its input.
 
-use super::UNREADABLE;
+use super::failure::Failure;
 use super::inputs::refuse_same_file;
-use super::output::{print, print_json, show};
+use super::output::{print, print_json};
 use crate::recorder::{RecoverReport, recover as recover_recording};
 use clap::Args;
 use serde_json::json;
@@ -20,29 +20,21 @@ pub(super) struct RecoverArguments {
     output: PathBuf,
     /// One JSON document on stdout
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
-pub(super) fn recover(arguments: &RecoverArguments) -> Result<(), u8> {
-    refuse_same_file(&arguments.recording, &arguments.output)?;
-    match recover_recording(&arguments.recording, &arguments.output) {
-        Ok(report) => {
-            let output = arguments.output.display();
-            if arguments.json {
-                print_json(&json!({
-                    "format": 1, "output": output.to_string(), "messages": report.messages, "end_s": report.end_s,
-                    "was_whole": report.was_whole, "chunks": report.chunks, "attachments": report.attachments,
-                    "left_out": report.left_out, "findings": report.findings, "bytes": report.bytes,
-                }));
-            } else {
-                print(&format!("{}{output}\n", text(&report)));
-            }
-            Ok(())
-        }
-        Err(finding) => {
-            show([&finding]);
-            Err(UNREADABLE)
-        }
+pub(super) fn recover(arguments: &RecoverArguments) -> Result<(), Failure> {
+    refuse_same_file([arguments.recording.as_path()], &arguments.output)?;
+    let report = recover_recording(&arguments.recording, &arguments.output).map_err(Failure::unreadable)?;
+    let output = arguments.output.display();
+    if arguments.json {
+        print_json(&json!({
+            "format": 1, "output": output.to_string(), "messages": report.messages, "end_s": report.end_s,
+            "was_whole": report.was_whole, "chunks": report.chunks, "attachments": report.attachments,
+            "left_out": report.left_out, "findings": report.findings, "bytes": report.bytes,
+        }))
+    } else {
+        print(&format!("{}{output}\n", text(&report)))
     }
 }
 

@@ -2,9 +2,9 @@
 //!
 //! In: program, machine, options. Out: a recording, figures as table or JSON, findings. Does not compute any of them.
 
+use super::failure::Failure;
 use super::inputs::{MachineChoice, default_recording, open_program, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show, table};
-use super::{FOUND_WRONG, UNREADABLE};
 use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome, RunSummary};
 use crate::machine::Loaded;
@@ -43,7 +43,7 @@ pub(super) struct RunArguments {
     threads: u16,
     /// One JSON document on stdout
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -53,11 +53,11 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-pub(super) fn run(arguments: &RunArguments) -> Result<(), u8> {
+pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load_to_run()?;
     let program = open_program(&arguments.program)?;
     let recording = arguments.output.clone().unwrap_or_else(|| default_recording(&arguments.program));
-    refuse_same_file(&arguments.program, &recording)?;
+    refuse_same_file([arguments.program.as_path()].into_iter().chain(arguments.machine.path()), &recording)?;
     let mut signals = parse_signals(arguments.record.as_deref(), &machine)?;
     if arguments.no_drives {
         // Without drives every wire behind the set-point is a copy of it: only what was computed is recorded.
@@ -78,19 +78,13 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), u8> {
         line.update(|| format!("{:.1} s simulated, {} blocks, line {}", at.time_s, at.blocks, at.line));
     });
     drop(line);
-    let outcome = outcome.map_err(|error| {
-        show([&error.0]);
-        UNREADABLE
-    })?;
+    let outcome = outcome.map_err(|error| Failure::unreadable(error.0))?;
     report(&outcome, Some(&recording), &Style { json: arguments.json, drives: !arguments.no_drives })
 }
 
-pub(super) fn parse_signals(text: Option<&str>, machine: &Loaded) -> Result<SignalChoice, u8> {
+pub(super) fn parse_signals(text: Option<&str>, machine: &Loaded) -> Result<SignalChoice, Failure> {
     let Some(text) = text else { return Ok(SignalChoice::all()) };
-    SignalChoice::parse(text, &machine.machine).map_err(|finding| {
-        show([&finding]);
-        UNREADABLE
-    })
+    SignalChoice::parse(text, &machine.machine).map_err(Failure::unreadable)
 }
 
 /// How to show an outcome.
@@ -100,7 +94,7 @@ pub(super) struct Style {
 }
 
 /// Findings to stderr, figures to stdout; exit code 1 on an alarm.
-pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &Style) -> Result<(), u8> {
+pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &Style) -> Result<(), Failure> {
     show(&outcome.warnings);
     if let Some(alarm) = &outcome.alarm {
         show([alarm]);
@@ -114,19 +108,19 @@ pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &
         show([&Diagnostic::note("K0004", message)]);
     }
     if style.json {
-        print_json(&document(&outcome.summary, recording));
+        print_json(&document(&outcome.summary, recording))?;
     } else {
-        print(&figures_text(&outcome.summary, style));
+        print(&figures_text(&outcome.summary, style))?;
         if let (Some(path), Some(recorded)) = (recording, &outcome.recording) {
             print(&format!(
                 "\nrecorded {} messages, {:.1} MB: {}\n",
                 recorded.messages,
                 recorded.bytes as f64 / 1e6,
                 path.display()
-            ));
+            ))?;
         }
     }
-    if outcome.alarm.is_some() { Err(FOUND_WRONG) } else { Ok(()) }
+    if outcome.alarm.is_some() { Err(Failure::told()) } else { Ok(()) }
 }
 
 /// The summary with the name of the recording, which the recording itself must not hold.

@@ -2,12 +2,10 @@
 //!
 //! In: programs, machine. Out: figures as tables or one JSON document. Does not simulate drives.
 
-use super::FOUND_WRONG;
-use super::UNREADABLE;
+use super::failure::Failure;
 use super::inputs::{MachineChoice, open_program};
 use super::output::{ProgressLine, print, print_json, show};
 use super::run::{Style, figures_text};
-use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome};
 use crate::machine::Loaded;
 use crate::recorder::SignalChoice;
@@ -28,37 +26,37 @@ pub(super) struct TimeArguments {
     threads: u16,
     /// One JSON document on stdout
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
-pub(super) fn time(arguments: &TimeArguments) -> Result<(), u8> {
+pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load_to_run()?;
     let mut documents = Vec::new();
-    let mut worst = Ok(());
+    let mut alarmed = false;
     for program in &arguments.programs {
         let outcome = one(program, &machine, arguments.threads)?;
         show(&outcome.warnings);
         if let Some(alarm) = &outcome.alarm {
             show([alarm]);
-            worst = Err(FOUND_WRONG);
+            alarmed = true;
         }
         if arguments.json {
             documents.push(serde_json::to_value(&outcome.summary).unwrap_or_else(|_| json!({})));
         } else {
-            print(&figures_text(&outcome.summary, &Style { json: false, drives: false }));
-            print("\nwithout waits for the axes to be in position: `sollwert run` simulates the drives\n");
+            print(&figures_text(&outcome.summary, &Style { json: false, drives: false }))?;
+            print("\nwithout waits for the axes to be in position: `sollwert run` simulates the drives\n")?;
         }
     }
     if arguments.json {
         match documents.as_slice() {
-            [one] => print_json(one),
-            many => print_json(&json!({"format": 1, "programs": many})),
+            [one] => print_json(one)?,
+            many => print_json(&json!({"format": 1, "programs": many}))?,
         }
     }
-    worst
+    if alarmed { Err(Failure::told()) } else { Ok(()) }
 }
 
-fn one(path: &Path, machine: &Loaded, threads: u16) -> Result<RunOutcome, u8> {
+fn one(path: &Path, machine: &Loaded, threads: u16) -> Result<RunOutcome, Failure> {
     let program = open_program(path)?;
     let options = RunOptions {
         machine,
@@ -73,9 +71,5 @@ fn one(path: &Path, machine: &Loaded, threads: u16) -> Result<RunOutcome, u8> {
     let mut line = ProgressLine::new();
     let outcome =
         kernel::run(options, &mut |at| line.update(|| format!("{:.1} s simulated, {} blocks", at.time_s, at.blocks)));
-    outcome.map_err(|error| {
-        let finding: &Diagnostic = &error.0;
-        show([finding]);
-        UNREADABLE
-    })
+    outcome.map_err(|error| Failure::unreadable(error.0))
 }

@@ -3,7 +3,7 @@
 //! In: one sample a position cycle. Out: the sample of `delay_s` ago, linear between two cycles. Memory is taken once, at
 //! construction. Does not interpolate better than linearly: that is what the balancing of a control does.
 
-/// Longest delay in position cycles (17 minutes at 1 ms); machine files are limited far below. A longer one is cut to this.
+/// Longest delay in position cycles (17 minutes at 1 ms); machine files are limited to a second. A longer one is cut to this.
 const CYCLES_MAX: f64 = 1_048_576.0;
 
 /// A delay line: D(s)\[k\] = (1-f) s\[k-n\] + f s\[k-n-1\] with d = (n+f) T_p.

@@ -120,11 +120,12 @@ impl Planner {
                 let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
                 corner = self.last.map_or(STOP, |before| junction::cap(&self.rules, &before, &ends));
                 let limits = self.rules.piece(contour, curve, &ends);
-                check_numbers(&limits, length_lu, &path)?;
+                check_motion(&limits, length_lu, &path)?;
                 self.last = Some(ends);
                 Motion::Moves { limits, length_lu, block_length_lu: (!blend).then_some(length_lu) }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
+                check_time(*time_s, &path)?;
                 (corner, rests_after) = (STOP, true);
                 Motion::Waits { time_s: *time_s }
             }
@@ -328,9 +329,13 @@ impl Motion {
     }
 }
 
-/// The alarm of a motion whose length or limits are not numbers: without them there is no law, and to leave the piece out would make
-/// the axes jump over it. Checked machines and programs within their bounds do not give any.
-fn check_numbers(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+/// A motion or wait longer than this is an alarm: 1e6 s are 11 days.
+const PIECE_TIME_MAX_S: f64 = 1e6;
+
+/// The alarm of a motion whose length or limits are not numbers, or which takes for ever: without numbers there is no law, and to
+/// leave the piece out would make the axes jump over it. Checked machines and programs within their bounds do not give the first; a
+/// feed of 1e-7 mm/min or a position of 1e15 mm gives the second.
+fn check_motion(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
     let dynamics = &limits.bounds.dynamics;
     let numbers = [
         length_lu,
@@ -340,12 +345,25 @@ fn check_numbers(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Resu
         dynamics.jerk_lu_s3.unwrap_or(1.0),
     ];
     if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
-        return Ok(());
+        return check_time(length_lu / limits.cap.velocity_lu_s, path);
     }
     let line = path.contour.block.line;
     let message = format!("the motion of line {line} has no speed that every axis allows");
     Err(Box::new(
         Diagnostic::error("P0001", message)
             .help("look for coordinates far outside the machine, or a circle of hardly any radius"),
+    ))
+}
+
+/// The alarm of a motion or wait that lasts `time_s` at least.
+fn check_time(time_s: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+    if time_s <= PIECE_TIME_MAX_S {
+        return Ok(());
+    }
+    let line = path.contour.block.line;
+    let message = format!("the block in line {line} takes {time_s:.3e} s, more than 11 days");
+    Err(Box::new(
+        Diagnostic::error("P0002", message)
+            .help("check its feed, its end position and its dwell, and the velocity limits of the machine"),
     ))
 }

@@ -107,7 +107,14 @@ impl Interpreter {
     pub fn next_move(&mut self) -> Result<Option<Move>, Box<Diagnostic>> {
         loop {
             if let Some(next) = self.queue.pop_front() {
-                self.idle_blocks = 0;
+                let takes_time = match next.kind {
+                    MoveKind::Function { .. } => false,
+                    MoveKind::Dwell { time_s } => time_s > 0.0,
+                    MoveKind::Rapid | MoveKind::Line | MoveKind::Arc(_) => true,
+                };
+                if takes_time {
+                    self.idle_blocks = 0;
+                }
                 return Ok(Some(next));
             }
             match std::mem::replace(&mut self.state, State::Ended) {

@@ -69,6 +69,11 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
     }
     let rows = follower.next_row;
     let mut warnings = options.machine.warnings.clone();
+    if !table.timed {
+        let period_s = machine.cycle.time_base.seconds(row_ticks(machine));
+        let message = format!("no column time_s: the rows are taken to stand {period_s} s apart, the position cycle");
+        warnings.push(Diagnostic::warning("F0012", message));
+    }
     warnings.extend(drive_warnings(machine, true));
     let summary = summary(machine, &follower.figures, rows, &warnings, alarm.as_ref());
     if let Some(mut recorder) = recorder {

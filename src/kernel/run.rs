@@ -154,6 +154,9 @@ fn conclude<S: PieceSource>(
     let mut warnings = options.machine.warnings.clone();
     warnings.extend(drive_warnings(&machine, options.drives));
     warnings.extend(findings.warnings);
+    if kernel.figures().blocks == 0 && drive_alarm.is_none() && findings.alarm.is_none() {
+        warnings.push(Diagnostic::warning("K0007", "the program moves no axis"));
+    }
     if kernel.figures().exact_stops > 0 {
         let message = "an exact stop ends when its set-point arrives: waiting until the axes are in position is not simulated yet";
         warnings.push(Diagnostic::warning("K0002", message));

@@ -16,6 +16,8 @@ pub struct SetpointTable {
     pub loads: Vec<(AxisId, Vec<f64>)>,
     /// Number of rows, at least 1.
     pub rows: usize,
+    /// The source says at which times its rows stand; otherwise the position cycle is assumed.
+    pub timed: bool,
 }
 
 /// Time steps may differ from the position cycle by this share: exports round to microseconds.
@@ -27,6 +29,7 @@ impl SetpointTable {
         let mut reader =
             csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(source.text.as_bytes());
         let header = reader.headers().map_err(|error| unreadable(source, &error))?.clone();
+        check_separator(source, &header)?;
         let columns = columns(source, &header, machine)?;
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         for record in reader.records() {
@@ -87,7 +90,7 @@ impl SetpointTable {
             return Err(Diagnostic::error("F0004", message));
         };
         let row_ns = |row: u64| time_base.time_ns(Tick(row * row_ticks(machine)));
-        let mut table = Self { positions: Vec::new(), loads: Vec::new(), rows: 0 };
+        let mut table = Self { positions: Vec::new(), loads: Vec::new(), rows: 0, timed: true };
         while row_ns(table.rows as u64) <= end_ns {
             table.rows += 1;
         }
@@ -111,7 +114,9 @@ impl SetpointTable {
         columns: &[Column],
         values: Vec<Vec<f64>>,
     ) -> Result<Self, Diagnostic> {
-        let mut table = Self { positions: Vec::new(), loads: Vec::new(), rows: values.first().map_or(0, Vec::len) };
+        let timed = columns.iter().any(|column| matches!(column, Column::Time));
+        let rows = values.first().map_or(0, Vec::len);
+        let mut table = Self { positions: Vec::new(), loads: Vec::new(), rows, timed };
         if table.rows == 0 {
             return Err(Diagnostic::error(
                 "F0001",
@@ -197,6 +202,19 @@ fn columns(source: &SourceText, header: &csv::StringRecord, machine: &Machine) -
             Ok(meanings[at])
         })
         .collect()
+}
+
+/// A header in one piece that holds another separator: spreadsheets of many countries write `;` and decimal commas.
+fn check_separator(source: &SourceText, header: &csv::StringRecord) -> Result<(), Diagnostic> {
+    let Some(separator) =
+        [(';', "`;`"), ('\t', "tabs")].iter().find(|(mark, _)| header.iter().any(|name| name.contains(*mark)))
+    else {
+        return Ok(());
+    };
+    let end = source.text.find(['\n', '\r']).unwrap_or(source.text.len());
+    Err(Diagnostic::error("F0011", format!("the columns of `{}` are separated by {}", source.name, separator.1))
+        .at(source.place(0..end, "expected commas"))
+        .help("export it with commas between the columns and points in the numbers"))
 }
 
 /// The rows must stand at the position cycle of the fastest axis.

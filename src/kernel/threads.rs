@@ -4,6 +4,7 @@
 //! much memory is used and who waits: what is planned does not depend on it.
 
 use super::preparation::{Findings, PieceSource, Preparation};
+use crate::base::Diagnostic;
 use crate::feed::PlannedPiece;
 use crossbeam_channel::{Receiver, bounded};
 use std::collections::VecDeque;
@@ -66,7 +67,14 @@ impl PieceSource for PreparationThread {
                     self.findings = findings;
                     self.messages = None;
                 }
-                Err(_) => self.messages = None,
+                Err(_) => {
+                    // The thread is gone without its findings: half a program must not look like a whole one.
+                    let message =
+                        "preparation broke down: the run ends here, and its figures are not those of the program";
+                    let alarm = Diagnostic::error("K0005", message).help("please report this, with the program");
+                    self.findings.alarm = Some(alarm);
+                    self.messages = None;
+                }
             }
         }
         self.ready.pop_front()

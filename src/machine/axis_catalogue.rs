@@ -9,6 +9,10 @@ use Absent::{Means, No, Number as Value, Required, Word};
 use Accepts::{Choice, Flag, Interval, Number, Text, Whole};
 
 const POSITIVE: Accepts = Number(Range::Positive);
+/// Delays in ms: a second is far beyond any control, and a delay line takes memory for every cycle of it.
+const DELAY: Accepts = Number(Range::Within(0.0, 1000.0));
+/// Cycles of the inner loops in µs: below one no drive works, and a run would take for ever.
+const LOOP_CYCLE: Accepts = Number(Range::Within(1.0, 1e6));
 const NOT_NEGATIVE: Accepts = Number(Range::NotNegative);
 const OR_INFINITE: Accepts = Number(Range::PositiveOrInfinite);
 const ANY: Accepts = Number(Range::Any);
@@ -104,9 +108,9 @@ pub(super) const DRIVE: &[Key] = &[
         .rotary("in_position_fine_um")
         .md("MD36010"),
     Key::new("position_cycle_ms", "ms", POSITIVE, Required, "[T_p] t_s is a whole multiple of it").md("MD10061"),
-    Key::new("speed_cycle_us", "µs", POSITIVE, Required, "[T_v] the position cycle is a whole multiple of it")
+    Key::new("speed_cycle_us", "µs", LOOP_CYCLE, Required, "[T_v] the position cycle is a whole multiple of it")
         .md("p0115[1], MD1001"),
-    Key::new("current_cycle_us", "µs", POSITIVE, Required, "[T_i] the speed cycle is a whole multiple of it")
+    Key::new("current_cycle_us", "µs", LOOP_CYCLE, Required, "[T_i] the speed cycle is a whole multiple of it")
         .md("p0115[0], MD1000"),
     Key::new("position_gain_per_s", "1/s", POSITIVE, Required, "[Kv] 1 (m/min)/mm = 16.667 1/s").md("MD32200"),
     Key::new(
@@ -126,9 +130,9 @@ pub(super) const DRIVE: &[Key] = &[
         "[J_ff] inertia that the torque feed-forward works with",
     )
     .md("MD32650"),
-    Key::new("setpoint_delay_ms", "ms", NOT_NEGATIVE, Value(0.0), "[d_pos] balancing delay of the position set-point")
+    Key::new("setpoint_delay_ms", "ms", DELAY, Value(0.0), "[d_pos] balancing delay of the position set-point")
         .md("MD32810, MD32800"),
-    Key::new("feedforward_delay_ms", "ms", NOT_NEGATIVE, Value(0.0), "[d_ff] delay of both feed-forward signals"),
+    Key::new("feedforward_delay_ms", "ms", DELAY, Value(0.0), "[d_ff] delay of both feed-forward signals"),
     Key::new("speed_setpoint_max_mm_s", "mm/s", OR_INFINITE, Means("inf"), "[v_max] clamp of the speed set-point")
         .linear("speed_setpoint_max_deg_s")
         .md("MD36210, p1082"),

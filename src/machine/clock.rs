@@ -11,6 +11,9 @@ use crate::base::TimeBase;
 use crate::base::diagnostics::Diagnostic;
 use crate::base::units::{MS_PER_S, US_PER_S, s_from_ms};
 
+/// Shortest t_s: a thousandth of what controls have, and a run would take for ever.
+const SETPOINT_PERIOD_MIN_S: f64 = 1e-6;
+
 /// Cycles of the loops of a drive, as written, and where.
 #[derive(Clone)]
 pub(super) struct LoopCycles<'f> {
@@ -34,6 +37,14 @@ pub(super) fn cycle(root: &Section<'_>, drafts: &mut [AxisDraft<'_>]) -> Cycle {
     let t_cyl_ms = section.number("t_cyl_ms");
     let f_s = section.number("f_s");
     let t_s_s = s_from_ms(t_cyl_ms * f_s);
+    if t_s_s < SETPOINT_PERIOD_MIN_S {
+        let message = format!(
+            "t_s = cycle.f_s * cycle.t_cyl_ms = {f_s} * {t_cyl_ms} ms = {} ms is out of range, allowed: 0.001 ms to 1000 ms",
+            shown(t_s_s * MS_PER_S)
+        );
+        let help = "set-points come every f_s * t_cyl_ms; a control has some milliseconds";
+        section.report_at("t_cyl_ms", "out of range", Diagnostic::error("M0006", message).help(help));
+    }
     let mut ticks_per_setpoint = 1;
     let mut ratios = Vec::with_capacity(drafts.len());
     for draft in drafts.iter() {

@@ -27,6 +27,8 @@ pub enum Range {
     Between(f64, f64),
     /// Greater than the first, at most the second.
     UpTo(f64, f64),
+    /// From the first to the second, both included.
+    Within(f64, f64),
 }
 
 impl Range {
@@ -41,6 +43,7 @@ impl Range {
             Self::NotZero => sized && value != 0.0,
             Self::Between(low, high) => sized && value > low && value < high,
             Self::UpTo(low, high) => sized && value > low && value <= high,
+            Self::Within(low, high) => sized && (low..=high).contains(&value),
         }
     }
 
@@ -55,6 +58,7 @@ impl Range {
             Self::NotZero => format!("positive or negative, not 0{unit} (magnitude 1e-12 to 1e12)"),
             Self::Between(low, high) => format!("greater than {low}{unit} and less than {high}{unit}"),
             Self::UpTo(low, high) => format!("greater than {low}{unit} and at most {high}{unit}"),
+            Self::Within(low, high) => format!("{low}{unit} to {high}{unit}"),
         }
     }
 }

@@ -120,6 +120,9 @@ fn accepted(key: &Key) -> Value {
         Accepts::Number(Range::UpTo(low, high)) => {
             json!({ "type": "number", "exclusiveMinimum": low, "maximum": high })
         }
+        Accepts::Number(Range::Within(low, high)) => {
+            json!({ "type": "number", "minimum": low, "maximum": high })
+        }
         Accepts::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
         Accepts::Flag => json!({ "type": "boolean" }),
         Accepts::Text => json!({ "type": "string", "minLength": 1 }),

@@ -44,7 +44,13 @@ impl ProgramSource {
     /// Reads a file. An unreadable file is wrong usage, not a wrong program: the caller exits with 2.
     pub fn from_file(path: &Path) -> Result<Self, Diagnostic> {
         match std::fs::read(path) {
-            Ok(bytes) => Ok(Self::from_bytes(&path.to_string_lossy(), bytes)),
+            Ok(bytes) => match no_program(&bytes) {
+                Some((what, help)) => {
+                    let message = format!("the program `{}` cannot be read: it is {what}", path.display());
+                    Err(Diagnostic::error(codes::UNREADABLE, message).help(help))
+                }
+                None => Ok(Self::from_bytes(&path.to_string_lossy(), bytes)),
+            },
             Err(error) => Err(Diagnostic::error(
                 codes::UNREADABLE,
                 format!("the program `{}` cannot be read: {error}", path.display()),
@@ -177,4 +183,16 @@ mod tests {
             assert_eq!(find_byte(&text, b'\n'), length);
         }
     }
+}
+
+/// Bytes looked at to tell text from data.
+const HEAD_BYTES: usize = 4096;
+
+/// What a file is that cannot be an NC program, and what to do: text in two-byte characters, or no text at all.
+fn no_program(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Some(("UTF-16 text", "save it as UTF-8, Latin-1 or Windows-1252"));
+    }
+    let head = &bytes[..bytes.len().min(HEAD_BYTES)];
+    head.contains(&0).then_some(("no text: it holds zero bytes", "give the path of an NC program"))
 }

@@ -360,7 +360,7 @@ fn damaged(path: &Path, damage: &Damage, contents: &Contents, size_bytes: u64) -
             end_ns as f64 / NS_PER_S,
             recover_help(path)
         ),
-        None => "it holds no complete chunk: run the program again".to_owned(),
+        None => format!("it holds no complete chunk, only what of one came to the disk: {}", recover_help(path)),
     };
     let message = format!("{shown} is not a whole recording ({size_bytes} bytes): {}", damage.sentence());
     Diagnostic::error("R0013", message).help(rescue)

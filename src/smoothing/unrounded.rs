@@ -7,7 +7,7 @@ use super::corner::Reason;
 use crate::base::Diagnostic;
 use crate::base::diagnostics::Place;
 use crate::interpreter::Event;
-use crate::program::{BlockRef, OpenedProgram};
+use crate::program::{BlockRef, OpenedProgram, ProgramSource};
 
 /// Warnings not yet taken, and what has been said.
 #[derive(Clone, Debug, Default)]
@@ -56,7 +56,8 @@ impl Unrounded {
     pub(super) fn place(&self, block: BlockRef) -> Option<Place> {
         let program = self.programs.iter().rev().find(|program| program.id == block.program)?;
         let line = program.bytes.split(|byte| *byte == b'\n').nth((block.line as usize).checked_sub(1)?)?;
-        let line_text = String::from_utf8_lossy(line).trim_end().to_owned();
+        let source = ProgramSource::from_bytes(&program.name, program.bytes.clone());
+        let line_text = source.decode(line).trim_end().to_owned();
         let columns = 0..line_text.len();
         Some(Place { file: program.name.clone(), line: block.line, line_text, columns, label: "ends here".to_owned() })
     }
