@@ -81,7 +81,9 @@ impl Rules {
         if mode == PathMode::ExactStop || unit_changes {
             return Junction::Stop;
         }
-        if mode == PathMode::G64 {
+        // What has no length has no corner either: such a block goes on whole, and feed refuses it.
+        let measurable = before.curve.length_lu().is_finite() && after.curve.length_lu().is_finite();
+        if mode == PathMode::G64 || !measurable {
             return Junction::Pass;
         }
         let wanted_mm = self.wanted_mm(before, after);

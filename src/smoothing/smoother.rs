@@ -203,6 +203,8 @@ impl Held {
 
     fn shortened(&self, tail_lu: f64) -> Curve {
         match &self.curve {
+            // Nothing is taken off: the block as it is, whatever its length.
+            whole if self.head_lu == 0.0 && tail_lu == 0.0 => whole.clone(),
             Curve::Line(line) => Curve::Line(line.shortened(self.head_lu, tail_lu)),
             curve => curve.trimmed(self.head_lu, curve.length_lu() - tail_lu),
         }

@@ -2,7 +2,7 @@
 
 use crate::corners::{Transition, before_corner_mm, nearest_mm, transition};
 use crate::replay::{MACHINES, Replay, Row, linear, machine, minus, norm, replay};
-use crate::text::{Kind, dense, program};
+use crate::text::{Kind, dense, planes, program};
 use sollwert::machine::{Machine, PathMode};
 
 /// Points of programs are rounded to 1e-6 mm at arcs; the control spreads that over the arc.
@@ -73,12 +73,12 @@ fn check(machine: &Machine, case: &str, run: &Replay) {
 /// The path comes to rest in a point: within a cycle of it the motion is below what jerk makes of rest in that time.
 fn rests(machine: &Machine, at: &str, run: &Replay, rows: &[Row], point: &[f64; 5]) {
     let Some(last) = rows.last() else { return };
-    let jerk = |i: usize| machine.axes.get(i).map_or(0.0, |axis| axis.limits.jerk_max_lu_s3);
-    for i in 0..machine.axes.len() {
+    for (i, axis) in machine.axes.iter().enumerate() {
+        let jerk = axis.limits.jerk_max_lu_s3;
         let near = (last.q[i] - point[i]).abs();
-        assert!(near <= jerk(i) * run.t_s.powi(3) / 6.0 + 1e-9, "{at}: last row {near} from the stop");
+        assert!(near <= jerk * run.t_s.powi(3) / 6.0 + 1e-9, "{at}: last row {near} from the stop");
         let v = last.velocity[i].abs();
-        assert!(v <= jerk(i) * run.t_s.powi(2) / 2.0 + 1e-9, "{at}: last row at {v} before the stop");
+        assert!(v <= jerk * run.t_s.powi(2) / 2.0 + 1e-9, "{at}: last row at {v} before the stop");
     }
 }
 
@@ -112,6 +112,7 @@ fn shipped_and_dense_programs_keep_to_the_contour() {
         let machine = machine(name, &[]);
         check(&machine, &format!("{name} pocket"), &replay(&machine, include_str!("../../programs/pocket.mpf")));
         check(&machine, &format!("{name} spline"), &replay(&machine, include_str!("../../programs/spline.mpf")));
+        check(&machine, &format!("{name} planes"), &replay(&machine, &planes()));
         for mode in ["G64", "G60", "G642 CTOL=0.02", "G641 ADIS=0.1"] {
             let blocks = if mode == "G60" { 60 } else { 300 };
             check(&machine, &format!("{name} {mode}"), &replay(&machine, &dense(mode, 6000.0, blocks)));

@@ -56,12 +56,10 @@ fn check(machine: &Machine, case: &str, text: &str, run: &Replay) {
 fn lengths(machine: &Machine, case: &str, run: &Replay) {
     let linear = linear(machine);
     let blocks: f64 = run.elements.values().map(|element: &Element| element.length_mm(&linear)).sum();
-    let (mut low, mut high) = (blocks, blocks);
+    let (mut low, high) = (blocks, blocks);
     for (_, transition) in transitions(machine, &run.elements) {
         if let Transition::Blend(blend) = transition {
             low -= 2.0 * blend.t_mm * (1.0 - (blend.angle_rad / 2.0).cos());
-            // A loop-free blend is shorter than its legs; near reversals alpha = 2.5 makes it overshoot them by nothing.
-            high += 0.0;
         }
     }
     let length = run.summary.path_length_mm;

@@ -9,7 +9,7 @@
 
 use crate::corners::{Blend, Transition, before_corner_mm, transition};
 use crate::replay::{Element, MACHINES, Replay, Row, linear, machine, minus, norm, replay};
-use crate::text::{Kind, dense, program};
+use crate::text::{Kind, dense, planes, program};
 use sollwert::machine::Machine;
 use std::collections::BTreeMap;
 
@@ -191,11 +191,12 @@ fn one_axis_ten_times_weaker() {
 }
 
 #[test]
-fn dense_paths() {
+fn dense_paths_and_arcs_in_all_planes() {
     for name in MACHINES {
         let machine = machine(name, &[]);
         for mode in ["G64", "G642 CTOL=0.01", "G642 CTOL=0.1", "G641 ADIS=0.1"] {
             judge(&machine, &format!("{name} {mode}"), &dense(mode, 8000.0, 400));
         }
+        judge(&machine, &format!("{name} planes"), &planes());
     }
 }

@@ -105,7 +105,7 @@ impl Writer {
     fn line(&mut self, word: &str) {
         let length = (self.random.between(0.01_f64.ln(), 50_f64.ln())).exp();
         self.heading += match self.random.below(8) {
-            0 => self.random.between(-3.14, 3.14),
+            0 => self.random.between(-3.1, 3.1),
             1 => std::f64::consts::PI,
             2 => std::f64::consts::PI - self.random.between(0.0, 0.03),
             3 => self.random.between(-1.5e-3, 1.5e-3),
@@ -128,12 +128,22 @@ impl Writer {
         self.at = next;
         let [x, y, z] = next;
         self.say(format_args!("{word} X{x:.4} Y{y:.4} Z{z:.4}"));
-        if !self.rotary.is_empty() && self.random.below(3) == 0 {
+        self.turn(3);
+        if self.random.below(8) == 0 && !self.rotary.is_empty() {
+            // Alone.
+            self.text += "\nG1";
+            self.turn(1);
+        }
+        self.text.push('\n');
+    }
+
+    /// A word of a rotary axis, in one block of `every`.
+    fn turn(&mut self, every: u32) {
+        if !self.rotary.is_empty() && self.random.below(every) == 0 {
             let axis = self.rotary[self.random.below(self.rotary.len() as u32) as usize];
             let angle = self.random.between(-25.0, 80.0);
             self.say(format_args!(" {axis}{angle:.3}"));
         }
-        self.text.push('\n');
     }
 
     /// An arc, a full circle or a helix, tangential to the heading or not.
@@ -141,7 +151,7 @@ impl Writer {
         let radius = (self.random.between(0.1_f64.ln(), 15_f64.ln())).exp();
         let counter = self.random.below(2) == 0;
         if self.random.below(2) == 0 {
-            self.heading = self.random.between(-3.14, 3.14);
+            self.heading = self.random.between(-3.1, 3.1);
         }
         let sense = if counter { 1.0 } else { -1.0 };
         let side = self.heading + sense * std::f64::consts::FRAC_PI_2;
@@ -159,7 +169,9 @@ impl Writer {
         let [ex, ey] = if sweep == 0.0 { [x, y] } else { [ex, ey].map(|v| (v * 1e6).round() / 1e6) };
         let ez = (ez * 1e4).round() / 1e4;
         let word = if counter { "G3" } else { "G2" };
-        self.say(format_args!("{word} X{ex:.6} Y{ey:.6} Z{ez:.4} I{i:.6} J{j:.6}\n"));
+        self.say(format_args!("{word} X{ex:.6} Y{ey:.6} Z{ez:.4} I{i:.6} J{j:.6}"));
+        self.turn(3);
+        self.text.push('\n');
         self.at = [ex, ey, ez];
         self.heading += sense * sweep;
     }
@@ -176,4 +188,29 @@ pub fn dense(mode: &str, feed: f64, points: u32) -> String {
         writeln!(text, "X{x:.4} Y{y:.4}").unwrap();
     }
     text + "M30\n"
+}
+
+/// Arcs in all planes, by centre and by radius, with extra turns and pitch, between lines.
+pub fn planes() -> String {
+    let mut text = String::from("G90 G71 G64 G1 X0 Y0 Z20 F4000\n");
+    for plane in ["G17", "G18", "G19"] {
+        let [first, second, third] = match plane {
+            "G17" => ["X", "Y", "Z"],
+            "G18" => ["Z", "X", "Y"],
+            _ => ["Y", "Z", "X"],
+        };
+        let (i, j) = (centre_word(first), centre_word(second));
+        text += &format!("{plane} G91\nG3 {first}10 {second}10 CR=10\nG2 {first}4 {second}-4 {j}-4 {third}1.5\n");
+        text +=
+            &format!("G2 {i}-3 TURN=2 {third}6\nG1 {first}5 {second}7 {third}-2\nG3 {first}0 {second}8 CR=-5\nG90\n");
+    }
+    text + "G1 X0 Y0 Z20\nM30\n"
+}
+
+fn centre_word(axis: &str) -> &'static str {
+    match axis {
+        "X" => "I",
+        "Y" => "J",
+        _ => "K",
+    }
 }

@@ -32,11 +32,14 @@ pub struct PoseRow {
     pub quaternion: [f64; 4],
 }
 
+/// Signals of an axis: times in ns, and one column a field, by the field's name without its unit.
+type AxisColumns = (Vec<u64>, BTreeMap<&'static str, Vec<f64>>);
+
 /// Everything that was recorded.
 pub struct Trace {
     pub path: PathBuf,
-    /// Per axis: times, and one column a field, by the field's name without its unit.
-    pub axes: BTreeMap<String, (Vec<u64>, BTreeMap<&'static str, Vec<f64>>)>,
+    /// Per axis.
+    pub axes: BTreeMap<String, AxisColumns>,
     pub rows: Vec<PathRow>,
     pub events: Vec<EventRow>,
     pub poses: [Vec<PoseRow>; 2],
