@@ -35,7 +35,7 @@ pub(super) struct RunArguments {
     /// Rate of the axis signals; speed and current are not built yet
     #[arg(long, value_name = "RATE", default_value = "position", value_parser = ["position"])]
     record_rate: String,
-    /// Mantissa bits to keep in recorded values, 1 to 52: 36 keep 7e-9 mm and save most of the size
+    /// Mantissa bits to keep in recorded values, 1 to 52: 36 keep 7e-9 mm and save a fifth of the size
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=52))]
     record_precision: Option<u8>,
     /// Threads: 1 runs preparation inside the cycle; the result is the same
@@ -149,6 +149,9 @@ pub(super) fn figures_text(summary: &RunSummary, style: &Style) -> String {
     rows.push(vec![cell("set-points"), summary.setpoints.to_string()]);
     rows.push(vec![cell("blended corners"), summary.corners_total.to_string()]);
     let mut text = format!("{} on {}\n\n{}", summary.program, summary.machine, table(&rows));
+    if let Some(alarm) = &summary.alarm {
+        text += &format!("\nended early by alarm {} in line {}: {}\n", alarm.code, alarm.line, alarm.message);
+    }
     let mut limits: Vec<(&String, &f64)> = summary.limits.iter().collect();
     limits.sort_by(|a, b| b.1.total_cmp(a.1));
     let limits: Vec<Vec<String>> =
