@@ -339,7 +339,7 @@ fn rotary_moves_have_a_feed_in_degrees() {
 fn endless_axes_go_the_way_that_is_asked() {
     let result = run_bytes(b"G0 C350\nC=DC(10)\nC=ACN(0)\nC=ACP(350)\nC=DC(350)\nC=ACP(10)", &xyzbc());
     let ends: Vec<_> = result.lines().iter().map(|line| line.split(' ').nth(6).unwrap().to_owned()).collect();
-    assert_eq!(ends, ["C350", "C370", "C360", "C710", "C730"], "{}", result.listing);
+    assert_eq!(ends, ["C350", "C370", "C360", "C710", "C710", "C730"], "{}", result.listing);
     assert_eq!(run_bytes(b"G0 B=ACP(10)", &xyzbc()).alarm().code, "E0508");
 }
 
@@ -359,9 +359,13 @@ fn modes_travel_with_the_moves() {
 }
 
 #[test]
-fn a_block_that_moves_nothing_makes_no_move() {
+fn a_block_that_leads_to_where_the_axes_stand_is_a_move() {
     let result = run("G1 F100 X0\nX0 M8\nX1\nX1");
-    assert_eq!(result.lines(), ["2 function X0 Y0 Z0 M8", "3 line X1 Y0 Z0 F100"]);
+    let wanted = ["1 line X0 Y0 Z0 F100", "2 line X0 Y0 Z0 F100 M8", "3 line X1 Y0 Z0 F100", "4 line X1 Y0 Z0 F100"];
+    assert_eq!(result.lines(), wanted);
+    // It takes no time: a loop of nothing else is endless.
+    let alarm = run("G1 F100 X1\nWHILE 1\nX1\nENDWHILE\nM30").alarm;
+    assert_eq!(alarm.map(|alarm| alarm.code), Some("E0403"));
 }
 
 #[test]

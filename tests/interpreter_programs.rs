@@ -186,7 +186,7 @@ fn a_cam_program_runs_from_first_to_last_block() {
         "13 function X-365 Y224 Z610 B0 C0 T=\"MILL_D8_90\"",
         "14 function X-365 Y224 Z610 B0 C0 stops M6",
         "15 function X-365 Y224 Z610 B0 C0 MSG(\"FINISH\")",
-        "16 function X-365 Y224 Z610 B0 C0 D0",
+        "16 rapid X-365 Y224 Z610 B0 C0 rapid D0",
         "17 rapid X-365 Y224 Z610 B10 C-90 rapid",
         "21 rapid X-10.46 Y-22.721 Z16 B10 C-90 rapid S10345 D1 M3 M7",
         "22 line X-10.46 Y-22.721 Z0 B10 C-90 F2069",

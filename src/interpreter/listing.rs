@@ -16,6 +16,7 @@
 //! A dwell adds `4s`, a function that brings the path to rest adds `stops`. Numbers have at most six decimals and no trailing
 //! zeros. Does not read them back.
 
+use super::motion::rotary_alone;
 use super::value::trimmed;
 use super::wire::{Event, Feed, Modes, Move, MoveKind};
 use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
@@ -102,9 +103,8 @@ pub fn format_move(machine: &Machine, start: PartPoint, shown: &Move) -> String 
 /// rapids, dwells and functions.
 pub fn feed_per_minute(machine: &Machine, start: PartPoint, shown: &Move) -> Option<f64> {
     let Feed::Path { feed_lu_s } = shown.feed else { return None };
-    let linear = |id: AxisId| machine.axis(id).kind == AxisKind::Linear && start.0[id] != shown.end.0[id];
     match shown.kind {
-        MoveKind::Line if !machine.axis_ids().any(linear) => Some(deg_from_rad(feed_lu_s) * S_PER_MIN),
+        MoveKind::Line if rotary_alone(machine, start, shown.end) => Some(deg_from_rad(feed_lu_s) * S_PER_MIN),
         MoveKind::Line | MoveKind::Arc(_) => Some(mm_min_from_mm_s(feed_lu_s)),
         MoveKind::Rapid | MoveKind::Dwell { .. } | MoveKind::Function { .. } => None,
     }

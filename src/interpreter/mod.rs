@@ -6,7 +6,8 @@
 //! Decisions where the language leaves room:
 //!
 //! * Words of a block take effect from left to right (assignments, G functions), then feed, frame, M6, motion, M0/M1/M2/M30.
-//! * A block that moves nothing makes no move, unless it outputs something.
+//! * A block with axis words is a move, also where it leads to where the axes stand: it has a line in the listing, and G9 or G60 stops
+//!   in it. It takes no time, so that a loop of such blocks alone counts as endless.
 //! * Zero offsets (G54 and so on) are all 0 until there is a table of them. SUPA, G53 and G153 suppress TRANS for their block.
 //! * G70 converts positions, arcs and frames; G700 also F, CTOL and ADIS. Rotary axes are never converted.
 //! * With G91 or IC() an axis also makes good a change of TRANS since its last motion (SD42440 = 1, the control's default).

@@ -11,6 +11,7 @@ use super::value::trimmed;
 use super::wire::{ArcGeometry, Event, Feed, MoveKind};
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
+use crate::machine::Machine;
 use crate::program::plain::PlainBlock;
 use crate::program::syntax::{Form, Typed};
 use crate::program::words::Plane;
@@ -106,9 +107,6 @@ impl Interpreter {
         };
         self.check_travel(words, end);
         self.note_applied(words);
-        if end == start && !matches!(kind, MoveKind::Arc(_)) {
-            return Ok(());
-        }
         self.position = end;
         let feed = self.feed_of(start, end, matches!(kind, MoveKind::Arc(_)));
         self.emit(kind, feed, words.exact_stop, std::mem::take(events));
@@ -156,7 +154,7 @@ impl Interpreter {
         self.number += 1;
         self.modal.motion = motion;
         self.modal.feed = feed;
-        if end != start {
+        if block.axes.as_slice().iter().any(Option::is_some) {
             self.position = end;
             let kind = if motion == Motion::Rapid { MoveKind::Rapid } else { MoveKind::Line };
             let feed = self.feed_of(start, end, false);
@@ -175,9 +173,8 @@ impl Interpreter {
 
     fn feed_of(&self, start: PartPoint, end: PartPoint, is_arc: bool) -> Feed {
         let Some(feed) = self.modal.feed.filter(|_| self.modal.motion != Motion::Rapid) else { return Feed::Rapid };
-        let linear_moves = |id: AxisId| self.machine.axis(id).kind == AxisKind::Linear && end.0[id] != start.0[id];
-        let linear = is_arc || self.machine.axis_ids().any(linear_moves);
-        Feed::Path { feed_lu_s: if linear { feed.linear_mm_s } else { feed.rotary_rad_s } }
+        let rotary = !is_arc && rotary_alone(&self.machine, start, end);
+        Feed::Path { feed_lu_s: if rotary { feed.rotary_rad_s } else { feed.linear_mm_s } }
     }
 
     /// All axes at the end of the block.
@@ -366,4 +363,10 @@ fn way_round(difference_rad: f64, form: Form) -> f64 {
         Form::Shortest if forward_rad > PI => forward_rad - TAU,
         _ => forward_rad,
     }
+}
+
+/// True if rotary axes move from `start` to `end` and no linear one does: F is then an angle per minute.
+pub(super) fn rotary_alone(machine: &Machine, start: PartPoint, end: PartPoint) -> bool {
+    let moves = |kind: AxisKind| machine.axis_ids().any(|id| machine.axis(id).kind == kind && start.0[id] != end.0[id]);
+    moves(AxisKind::Rotary) && !moves(AxisKind::Linear)
 }

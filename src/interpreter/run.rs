@@ -56,6 +56,8 @@ pub struct Interpreter {
     opened: Option<Event>,
     state: State,
     pub(super) idle_blocks: u32,
+    /// Where the move ended that was handed over last: the next one takes time only if it leads elsewhere.
+    handed_over: PartPoint,
     kept_blocks: BTreeMap<u32, Arc<Block>>,
     furthest_line: u32,
 }
@@ -95,6 +97,7 @@ impl Interpreter {
             opened: Some(Event::ProgramOpened(opened)),
             state: State::Running,
             idle_blocks: 0,
+            handed_over: position,
             kept_blocks: BTreeMap::new(),
             furthest_line: 0,
             machine: Arc::new(machine.clone()),
@@ -110,11 +113,13 @@ impl Interpreter {
                 let takes_time = match next.kind {
                     MoveKind::Function { .. } => false,
                     MoveKind::Dwell { time_s } => time_s > 0.0,
-                    MoveKind::Rapid | MoveKind::Line | MoveKind::Arc(_) => true,
+                    MoveKind::Rapid | MoveKind::Line => next.end != self.handed_over,
+                    MoveKind::Arc(_) => true,
                 };
                 if takes_time {
                     self.idle_blocks = 0;
                 }
+                self.handed_over = next.end;
                 return Ok(Some(next));
             }
             match std::mem::replace(&mut self.state, State::Ended) {
