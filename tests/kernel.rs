@@ -1,7 +1,9 @@
 //! The kernel as a library and as a loop: snapshot, threads, determinism, figures, alarms.
 
 use sollwert::base::{AxisKind, MachinePoint};
-use sollwert::kernel::{FollowOptions, Kernel, RunOptions, RunOutcome, SetpointTable, Status, follow, run};
+use sollwert::feed::{Limit, LimitKind};
+use sollwert::kernel::{Figures, FollowOptions, Kernel, RunOptions, RunOutcome, RunSummary, SetpointTable, Status};
+use sollwert::kernel::{follow, run};
 use sollwert::machine::{Loaded, load};
 use sollwert::program::ProgramSource;
 use sollwert::recorder::{Recording, SignalChoice};
@@ -259,4 +261,19 @@ fn a_motion_without_a_speed_is_an_alarm_and_nothing_jumps_over_it() {
     assert!((last[0] - 20.0).hypot(last[1] - 5.0) < 1.0 && last[2] == 0.0, "{last:?}");
     let alarm = kernel.take_findings().alarm.expect("an alarm");
     assert_eq!((alarm.code, alarm.line()), ("P0001", 3), "{alarm:?}");
+}
+
+#[test]
+fn limits_of_one_name_add_up() {
+    let machine = machine("spinner_mvc850", &[]).machine;
+    let (x, y) = (machine.axis_by_name("X"), machine.axis_by_name("Y"));
+    let mut figures = Figures::new(&machine);
+    figures.setpoints = 10;
+    figures.limits = vec![
+        (Limit { kind: LimitKind::Corner, axis: x }, 3),
+        (Limit { kind: LimitKind::Jerk, axis: y }, 2),
+        (Limit { kind: LimitKind::Corner, axis: y }, 5),
+    ];
+    let limits = RunSummary::new(&machine, "part.mpf", &figures, false).limits;
+    assert_eq!(limits.into_iter().collect::<Vec<_>>(), [("Y.jerk".to_owned(), 0.2), ("corner".to_owned(), 0.8)]);
 }

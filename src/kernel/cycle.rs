@@ -55,6 +55,9 @@ pub struct CycleOutput {
     pub contour_error_mm: Option<f64>,
 }
 
+/// Pieces that may begin in one cycle before the list of them has to grow.
+const BEGUN_USUAL: usize = 64;
+
 /// Position cycle of an axis, and how it is reached from t_s.
 #[derive(Clone, Copy)]
 struct PositionCycle {
@@ -72,7 +75,7 @@ impl PositionCycle {
 }
 
 /// A set-point sampled ahead, with the pieces that begin on the way to it.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct Sampled {
     setpoint: Option<Setpoint>,
     begun: Vec<Begun>,
@@ -115,7 +118,7 @@ impl<S: PieceSource> Kernel<S> {
         let tool = kinematics.tool_pose(&home);
         let output = CycleOutput {
             setpoint: None,
-            begun: Vec::new(),
+            begun: Vec::with_capacity(BEGUN_USUAL),
             rows: Vec::new(),
             tool_setpoint: tool,
             tool_actual: tool,
@@ -141,7 +144,7 @@ impl<S: PieceSource> Kernel<S> {
             kinematics,
             contour_error: ContourErrorMeter::new(),
             figures: Figures::new(&machine),
-            ahead: Sampled::default(),
+            ahead: Sampled { setpoint: None, begun: Vec::with_capacity(BEGUN_USUAL) },
             output,
             next_setpoint: 0,
             machine,

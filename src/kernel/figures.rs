@@ -10,10 +10,11 @@ use crate::interpolator::{Begun, Setpoint};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 use crate::smoothing::Corner;
-use std::collections::BTreeMap;
 
 /// Corners listed one by one; all are counted, and all are events of the recording.
 pub const CORNERS_LISTED: usize = 10_000;
+/// Limits that a run meets, at most, before the list of them has to grow: three kinds of each of eight axes, and some of the path.
+const LIMITS_USUAL: usize = 64;
 /// A feed this near the programmed one counts as programmed feed.
 const PROGRAMMED_FEED_BAND: f64 = 1e-3;
 
@@ -30,8 +31,8 @@ pub struct Figures {
     pub cam_time_s: f64,
     /// Set-points within 0.1 % of the programmed F.
     pub at_programmed_feed: u64,
-    /// Set-points per limit that holds at their tick.
-    pub limits: BTreeMap<Limit, u64>,
+    /// Set-points per limit that holds at their tick, each limit once, in order of first appearance.
+    pub limits: Vec<(Limit, u64)>,
     /// The first corners, in path order.
     pub corners: Vec<(BlockRef, Corner, f64)>,
     /// All corners.
@@ -97,8 +98,8 @@ impl Figures {
             path_length_mm: 0.0,
             cam_time_s: 0.0,
             at_programmed_feed: 0,
-            limits: BTreeMap::new(),
-            corners: Vec::new(),
+            limits: Vec::with_capacity(LIMITS_USUAL),
+            corners: Vec::with_capacity(CORNERS_LISTED),
             corners_total: 0,
             exact_stops: 0,
             axes: PerAxis::default(),
@@ -145,7 +146,11 @@ impl Figures {
             return;
         }
         self.setpoints += 1;
-        *self.limits.entry(setpoint.path.limit).or_insert(0) += 1;
+        // A handful of limits hold in a whole run: searching them is quicker than a tree, and room for them is made beforehand.
+        match self.limits.iter_mut().find(|(limit, _)| *limit == setpoint.path.limit) {
+            Some((_, count)) => *count += 1,
+            None => self.limits.push((setpoint.path.limit, 1)),
+        }
         if let Some(programmed_lu_s) = setpoint.path.programmed_feed_lu_s {
             let off = (setpoint.path.feed_lu_s - programmed_lu_s).abs();
             self.at_programmed_feed += u64::from(off <= PROGRAMMED_FEED_BAND * programmed_lu_s);

@@ -18,7 +18,7 @@ mod threads;
 pub use cycle::{AxisRow, CycleOutput, Kernel, Status};
 pub use figures::Figures;
 pub use follow::{FollowOptions, FollowOutcome, follow};
-pub use preparation::{PieceSource, Preparation};
+pub use preparation::{Findings, PieceSource, Preparation};
 pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
 pub use setpoint_table::SetpointTable;
 pub use summary::{CornerSummary, RunSummary, Warning};

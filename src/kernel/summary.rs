@@ -102,7 +102,7 @@ impl RunSummary {
             path_length_mm: figures.path_length_mm,
             blocks: figures.blocks,
             setpoints: figures.setpoints,
-            limits: figures.limits.iter().map(|(limit, ticks)| (limit_name(machine, *limit), share(*ticks))).collect(),
+            limits: limit_shares(machine, figures),
             corners_total: figures.corners_total,
             corners: figures
                 .corners
@@ -163,6 +163,15 @@ pub(super) fn drive_warnings(machine: &Machine, drives: bool) -> Vec<Diagnostic>
         warnings.push(Diagnostic::warning("D0003", message));
     }
     warnings
+}
+
+/// Shares by name. Limits of one name are added up: a corner, say, may be limited by one axis here and by another there.
+fn limit_shares(machine: &Machine, figures: &Figures) -> BTreeMap<String, f64> {
+    let mut ticks: BTreeMap<String, u64> = BTreeMap::new();
+    for (limit, count) in &figures.limits {
+        *ticks.entry(limit_name(machine, *limit)).or_insert(0) += count;
+    }
+    ticks.into_iter().map(|(name, count)| (name, count as f64 / figures.setpoints as f64)).collect()
 }
 
 /// The contract's keys without an axis: feed, corner, cycle, look_ahead, dwell, in_position, override.
