@@ -98,6 +98,32 @@ fn recordings_are_equal_to_the_byte_on_any_number_of_threads() {
 }
 
 #[test]
+fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
+    // A current loop a thousand times too stiff and nothing that limits it. Line 3 is not acted on and warns, long after the alarm:
+    // whether preparation had got there must not show.
+    let sets = [
+        "axes.X.drive.current_gain_v_per_a=30000",
+        "axes.X.drive.voltage_max_v=inf",
+        "axes.X.drive.current_max_a=inf",
+        "axes.X.drive.speed_setpoint_max_mm_s=inf",
+    ];
+    let loaded = machine("spinner_mvc850", &sets);
+    let text = format!("CYCLE800()\n{}CYCLE832(0.1,1,1)\nM30\n", "G1 X1 F1000\nX0\n".repeat(300));
+    let mut recordings = Vec::new();
+    for threads in [1, 2, 2] {
+        let path = scratch(&format!("unstable_{threads}.mcap"));
+        let outcome = record(&text, &loaded, threads, &path);
+        let alarm = outcome.alarm.expect("the axis has left all bounds");
+        assert!(alarm.code == "D0001" && alarm.message.contains("axis X"), "{alarm:?}");
+        assert!(outcome.warnings.iter().any(|warning| warning.message.contains("CYCLE800")));
+        assert!(!outcome.warnings.iter().any(|warning| warning.message.contains("CYCLE832")));
+        Recording::open(&path).unwrap();
+        recordings.push(std::fs::read(&path).unwrap());
+    }
+    assert!(recordings.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+#[test]
 fn figures_count_what_the_contract_says() {
     let loaded = machine("spinner_mvc850", &[]);
     let path = scratch("figures.mcap");

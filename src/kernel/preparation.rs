@@ -17,7 +17,7 @@ pub trait PieceSource {
     /// The next piece in path order; `None` once the program has ended or an alarm has stopped it.
     fn next_piece(&mut self) -> Option<PlannedPiece>;
 
-    /// What preparation had to say, complete once `next_piece` has returned `None`.
+    /// What preparation had to say on the way to the pieces handed out; complete once `next_piece` has returned `None`.
     fn take_findings(&mut self) -> Findings;
 }
 
@@ -37,6 +37,7 @@ pub struct Preparation {
     smoother: Smoother,
     kinematics: Kinematics,
     planner: Planner,
+    warnings: Vec<Diagnostic>,
     alarm: Option<Diagnostic>,
     finished: bool,
 }
@@ -49,6 +50,7 @@ impl Preparation {
             smoother: Smoother::new(machine),
             kinematics: Kinematics::new(machine),
             planner: Planner::new(machine),
+            warnings: Vec::new(),
             alarm: None,
             finished: false,
         }
@@ -79,9 +81,16 @@ impl Preparation {
             self.alarm = Some(self.smoother.marked(*alarm, block));
             self.finished = true;
         }
+        self.warnings.extend(self.interpreter.take_warnings());
+        self.warnings.extend(self.smoother.take_warnings());
         if self.finished {
             self.planner.finish();
         }
+    }
+
+    /// Warnings since the last call, in the order in which blocks gave rise to them.
+    pub(super) fn take_warnings(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.warnings)
     }
 }
 
@@ -99,8 +108,6 @@ impl PieceSource for Preparation {
     }
 
     fn take_findings(&mut self) -> Findings {
-        let mut warnings = self.interpreter.take_warnings();
-        warnings.extend(self.smoother.take_warnings());
-        Findings { warnings, alarm: self.alarm.take() }
+        Findings { warnings: self.take_warnings(), alarm: self.alarm.take() }
     }
 }

@@ -16,14 +16,16 @@ const BATCH_PIECES: usize = 64;
 const BATCHES: usize = 16;
 
 enum Message {
-    Pieces(Vec<PlannedPiece>),
+    /// Each piece with the warnings of its preparation: what a run has to say after an alarm of a drive depends on the pieces that it
+    /// reached, not on how far this thread was.
+    Pieces(Vec<(PlannedPiece, Vec<Diagnostic>)>),
     Ended(Findings),
 }
 
 /// The receiving end.
 pub(super) struct PreparationThread {
     messages: Option<Receiver<Message>>,
-    ready: VecDeque<PlannedPiece>,
+    ready: VecDeque<(PlannedPiece, Vec<Diagnostic>)>,
     findings: Findings,
     worker: Option<JoinHandle<()>>,
 }
@@ -38,7 +40,7 @@ impl PreparationThread {
                 let mut batch = Vec::with_capacity(BATCH_PIECES);
                 while batch.len() < BATCH_PIECES && !ended {
                     match preparation.next_piece() {
-                        Some(piece) => batch.push(piece),
+                        Some(piece) => batch.push((piece, preparation.take_warnings())),
                         None => ended = true,
                     }
                 }
@@ -64,7 +66,8 @@ impl PieceSource for PreparationThread {
             match self.messages.as_ref()?.recv() {
                 Ok(Message::Pieces(batch)) => self.ready.extend(batch),
                 Ok(Message::Ended(findings)) => {
-                    self.findings = findings;
+                    self.findings.warnings.extend(findings.warnings);
+                    self.findings.alarm = findings.alarm;
                     self.messages = None;
                 }
                 Err(_) => {
@@ -77,7 +80,9 @@ impl PieceSource for PreparationThread {
                 }
             }
         }
-        self.ready.pop_front()
+        let (piece, warnings) = self.ready.pop_front()?;
+        self.findings.warnings.extend(warnings);
+        Some(piece)
     }
 
     fn take_findings(&mut self) -> Findings {
