@@ -13,9 +13,7 @@ use crate::base::AxisId;
 use crate::geometry::{Arc, Curve, CurveState};
 use crate::interpreter::Feed;
 use crate::kinematics::JointState;
-use crate::machine::{
-    AccelerationMode, ArcLimits, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine,
-};
+use crate::machine::{AccelerationMode, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine};
 use crate::smoothing::ContourPiece;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -35,8 +33,6 @@ pub(super) struct AxisRules {
     pub radial_jerk_share: f64,
     /// Feed inside a blend.
     pub blend_law: BlendLaw,
-    /// Directions that bound an arc.
-    pub arc_limits: ArcLimits,
     /// How a change of curvature is measured.
     pub curvature_jump: CurvatureJump,
     /// t_s.
@@ -79,7 +75,7 @@ pub(super) struct Ends {
 impl AxisRules {
     pub(super) fn new(machine: &Machine) -> Self {
         let setpoint_period_s = machine.cycle.time_base.setpoint_period_s();
-        let FeedSettings { corner_rule, overload_ratio, arc_limits, curvature_jump, .. } = machine.feed;
+        let FeedSettings { corner_rule, overload_ratio, curvature_jump, .. } = machine.feed;
         let corner_step = |axis: &crate::machine::Axis| {
             let a = axis.limits.acceleration_max_lu_s2;
             match corner_rule {
@@ -94,7 +90,6 @@ impl AxisRules {
             radial_acceleration_share: machine.smoothing.radial_acceleration_share,
             radial_jerk_share: machine.smoothing.radial_jerk_share,
             blend_law: machine.smoothing.blend_law,
-            arc_limits,
             curvature_jump,
             setpoint_period_s,
         }
@@ -118,10 +113,7 @@ impl AxisRules {
         let jerk_limited = piece.modes.acceleration_mode == AccelerationMode::Soft;
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
-            Curve::Arc(arc) => match self.arc_limits {
-                ArcLimits::Worst => self.arc(arc, feed, jerk_limited),
-                ArcLimits::Printed => self.arc_as_printed(arc, feed, jerk_limited),
-            },
+            Curve::Arc(arc) => self.arc(arc, feed, jerk_limited),
             Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
         }
     }
@@ -190,31 +182,6 @@ impl AxisRules {
             }
         }
         best
-    }
-
-    /// The rule as printed, for comparison: the acceleration of the direction of the centre at the entry stands for both
-    /// tangential and normal acceleration, and nothing is shared (models/arcs.md section 4) [Gassara 2013].
-    fn arc_as_printed(&self, arc: &Arc, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
-        let worst = WorstOnArc::new(arc);
-        let (sin, cos) = arc.angle_start_rad().sin_cos();
-        let [first, second] = arc.plane();
-        let entry = |axis: AxisId| match axis {
-            axis if axis == first => cos.abs(),
-            axis if axis == second => sin.abs(),
-            axis => worst.first(axis),
-        };
-        let velocity = self.largest(|axis, limits| worst.first(axis) / limits.velocity_max_lu_s);
-        let acceleration = self.largest(|axis, limits| entry(axis) / limits.acceleration_max_lu_s2);
-        let jerk = self.largest(|axis, limits| worst.first(axis) / limits.jerk_max_lu_s3);
-        let k = arc.curvature_per_mm();
-        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
-        let radial = Demand { demand_ratio: acceleration.demand_ratio * k, ..acceleration };
-        cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2));
-        if jerk_limited {
-            let turning = Demand { demand_ratio: jerk.demand_ratio * k * k, ..jerk };
-            cap = cap.min(turning.cap(LimitKind::RadialJerk, 3));
-        }
-        PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
     }
 }
 
