@@ -54,6 +54,13 @@ fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutco
     run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{error:?}"))
 }
 
+/// Figures of the drives that follow `table`, without a recording.
+fn followed(table: &SetpointTable, machine: &Loaded) -> serde_json::Value {
+    let signals = SignalChoice::all();
+    let options = FollowOptions { machine, start: Default::default(), recording: None, signals, mantissa_bits: None };
+    follow(table, &options).unwrap().summary
+}
+
 /// Everything that the cycles of a kernel give from here to the end, to the bit (Debug prints the shortest digits that read back).
 fn rest(kernel: &mut Kernel) -> String {
     let mut text = String::new();
@@ -121,6 +128,25 @@ fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
         recordings.push(std::fs::read(&path).unwrap());
     }
     assert!(recordings.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+#[test]
+fn a_machine_that_asks_for_what_is_not_built_is_refused_by_the_library_too() {
+    for set in ["feed.time_law=continuous", "smoothing.shape=quintic", "feed.arc_limits=printed"] {
+        let loaded = machine("spinner_mvc850", &[set]);
+        let options = RunOptions {
+            machine: &loaded,
+            program: program(PROGRAM),
+            drives: false,
+            recording: None,
+            mantissa_bits: None,
+            signals: SignalChoice::all(),
+            threads: 1,
+            pace_ratio: None,
+        };
+        let refused = run(options, &mut |_| {}).err().expect("not built yet").0;
+        assert!(refused.code == "M0201" && refused.message.contains(set.split('=').next().unwrap()), "{refused:?}");
+    }
 }
 
 #[test]
@@ -205,17 +231,10 @@ fn follow_reproduces_the_drives_of_a_run() {
     let path = scratch("to_follow.mcap");
     let run = record(PROGRAM, &loaded, 2, &path);
     let table = SetpointTable::from_recording(&Recording::open(&path).unwrap(), &loaded.machine).unwrap();
-    let options = FollowOptions {
-        machine: &loaded,
-        start: Default::default(),
-        recording: None,
-        signals: SignalChoice::all(),
-        mantissa_bits: None,
-    };
-    let followed = follow(&table, &options).unwrap();
+    let followed = followed(&table, &loaded);
     for axis in ["X", "Y", "Z"] {
         for key in ["following_error_max_mm", "following_error_rms_mm", "control_deviation_rms_mm"] {
-            assert_eq!(followed.summary["axes"][axis][key], run.summary.axes[axis][key], "{axis} {key}");
+            assert_eq!(followed["axes"][axis][key], run.summary.axes[axis][key], "{axis} {key}");
         }
     }
 }
@@ -252,15 +271,7 @@ fn an_outside_load_moves_an_axis_only_against_its_friction() {
     let deviation = |load: f64| {
         let text = format!("time_s,X_mm,X_load_n_m\n{}", row(load, 2000));
         let table = SetpointTable::from_csv(&sollwert::base::SourceText::new("s.csv", text), &loaded.machine).unwrap();
-        let options = FollowOptions {
-            machine: &loaded,
-            start: Default::default(),
-            recording: None,
-            signals: SignalChoice::all(),
-            mantissa_bits: None,
-        };
-        let figures = follow(&table, &options).unwrap().summary;
-        figures["axes"]["X"]["following_error_max_mm"].as_f64().unwrap()
+        followed(&table, &loaded)["axes"]["X"]["following_error_max_mm"].as_f64().unwrap()
     };
     assert_eq!(deviation(0.3), 0.0);
     assert!(deviation(3.0) > 1e-4);

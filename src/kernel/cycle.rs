@@ -101,7 +101,8 @@ pub struct Kernel<S = Preparation> {
 }
 
 impl Kernel<Preparation> {
-    /// At the start of `program`. With `drives` false every axis is ideal.
+    /// At the start of `program`. With `drives` false every axis is ideal. The caller sees to it that [`unsupported`](crate::machine::unsupported)
+    /// has nothing against the machine, as [`run`](super::run) does: a value that is not built yet would be passed over.
     pub fn new(machine: Arc<Machine>, program: ProgramSource, drives: bool) -> Self {
         let source = Preparation::new(program, &machine);
         Self::with_source(machine, source, drives)

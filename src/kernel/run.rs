@@ -9,7 +9,7 @@ use super::record::{record_alarm, record_cycle};
 use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
 use crate::base::Diagnostic;
-use crate::machine::{Loaded, Machine};
+use crate::machine::{Loaded, Machine, unsupported};
 use crate::program::{OpenedProgram, ProgramId, ProgramSource};
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
@@ -70,12 +70,16 @@ pub struct Deadlines {
     pub latest_s: f64,
 }
 
-/// A run that could not be made (exit 2): the recording cannot be written, no thread to be had.
+/// A run that could not be made.
 #[derive(Debug)]
 pub struct RunError(pub Diagnostic);
 
-/// Runs `options.program` to its end.
+/// Runs `options.program` to its end. Errors: the machine asks for what is not built yet ([`unsupported`]), no thread is to be had, the
+/// recording cannot be written.
 pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Result<RunOutcome, RunError> {
+    if let Some(refused) = unsupported(&options.machine.machine).into_iter().next() {
+        return Err(RunError(refused));
+    }
     let machine = Arc::new(options.machine.machine.clone());
     tracing::info!(program = options.program.file_name(), machine = %machine.name, threads = options.threads, drives = options.drives, "run starts");
     let preparation = Preparation::new(options.program.clone(), &machine);
