@@ -9,6 +9,8 @@ mod corners;
 mod drives;
 mod figures;
 mod limits;
+#[path = "../random/mod.rs"]
+mod random;
 mod recording;
 mod replay;
 mod text;
