@@ -497,6 +497,15 @@ fn run_time_errors_name_their_place() {
 }
 
 #[test]
+fn a_missing_value_says_what_to_write() {
+    for text in ["G1 F1 X=", "R1=2+", "IF R1>"] {
+        let alarm = run(text).alarm().clone();
+        assert_eq!(alarm.code, "E0104", "{text}");
+        assert!(alarm.help.is_some_and(|help| help.contains("write a number")), "{text}");
+    }
+}
+
+#[test]
 fn a_snapshot_goes_on_by_itself() {
     fn is_send<T: Send + Clone>(_: &T) {}
     let text = b"DEF INT II\nG1 F100\nFOR II=1 TO 5\nX=II\nENDFOR\nM30";

@@ -117,7 +117,8 @@ impl ExprParser<'_, '_> {
             }
             _ => {
                 let fault = expected(&before, "a value");
-                return Err(Box::new(Fault { code: codes::EXPECTED_VALUE, ..*fault }));
+                let fault = Box::new(Fault { code: codes::EXPECTED_VALUE, ..*fault });
+                return Err(fault.help("write a number, a variable or a bracket here, or take the word before it away"));
             }
         };
         Ok(Expr { columns: self.lexer.columns_from(start), kind })
