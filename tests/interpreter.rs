@@ -347,7 +347,7 @@ fn endless_axes_go_the_way_that_is_asked() {
 fn modes_travel_with_the_moves() {
     let text = "G1 F1 X1\nG9 X2\nX3 G64 BRISK FFWOF\nG641 ADIS=0.5 ADISPOS=2 X4\nG0 X5\nG642 CTOL=0.02 SOFT FFWON G1 X6\nCTOL=-1 G60 X7\nG645 X8";
     let result = run(text);
-    let modes: Vec<_> = result.moves.iter().map(|shown| shown.modes).collect();
+    let modes: Vec<_> = result.moves.iter().map(|shown| shown.modes.clone()).collect();
     let path_modes: Vec<_> = modes.iter().map(|modes| modes.path_mode).collect();
     use PathMode::{ExactStop, G64, G641, G642};
     assert_eq!(path_modes, [G642, ExactStop, G64, G641, G641, G642, ExactStop, G642]);

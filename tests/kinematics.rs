@@ -6,7 +6,7 @@ use sollwert::base::{AxisId, AxisVector, MachinePoint, PartPoint, PerAxis};
 use sollwert::geometry::{Curve, Line};
 use sollwert::interpreter::{Feed, Modes};
 use sollwert::kinematics::{Kinematics, ToolPose};
-use sollwert::machine::{AccelerationMode, KinematicsSettings, Machine, PathMode, RotaryJoint};
+use sollwert::machine::{KinematicsSettings, Machine, PathMode, RotaryJoint};
 use sollwert::program::BlockRef;
 use sollwert::smoothing::{ContourPiece, PieceKind};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, TAU};
@@ -164,18 +164,12 @@ fn machine_without_rotary_joints() {
 #[test]
 fn joint_path_is_the_contour_axis_by_axis() {
     let kinematics = mikron();
-    let modes = Modes {
-        path_mode: PathMode::G64,
-        contour_tolerance_mm: None,
-        rounding_distance_mm: None,
-        acceleration_mode: AccelerationMode::Soft,
-        feedforward_active: true,
-    };
+    let modes = Modes::new(PathMode::G64);
     let piece = |kind: PieceKind| ContourPiece {
         block: BlockRef::default(),
         kind,
         feed: Feed::Rapid,
-        modes,
+        modes: modes.clone(),
         events: Vec::new(),
         blocks_begun: 1,
         stop_at_end: true,

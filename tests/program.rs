@@ -348,7 +348,7 @@ proptest! {
         let slow = run_bytes(text("/").as_bytes(), &xyzbc());
         let alarm = |run: &nc_machine::Run| run.alarm.as_ref().map(|alarm| (alarm.code, alarm.line(), alarm.message.clone()));
         prop_assert_eq!(alarm(&fast), alarm(&slow));
-        let strip = |run: &nc_machine::Run| run.moves.iter().map(|shown| (shown.block, shown.kind, shown.end, shown.feed, shown.modes)).collect::<Vec<_>>();
+        let strip = |run: &nc_machine::Run| run.moves.iter().map(|shown| (shown.block, shown.kind.clone(), shown.end, shown.feed.clone(), shown.modes.clone())).collect::<Vec<_>>();
         prop_assert_eq!(strip(&fast), strip(&slow));
         prop_assert_eq!(fast.warnings.len(), slow.warnings.len());
     }

@@ -5,7 +5,7 @@ mod test_machine;
 use sollwert::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use sollwert::geometry::Curve;
 use sollwert::interpreter::{ArcGeometry, Event, Feed, Modes, Move, MoveKind};
-use sollwert::machine::{AccelerationMode, Machine, PathMode};
+use sollwert::machine::{Machine, PathMode};
 use sollwert::program::{BlockRef, OpenedProgram, ProgramId};
 use sollwert::smoothing::{ContourPiece, Corner, PieceKind, Smoother};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -28,19 +28,21 @@ fn point(components: &[f64]) -> PartPoint {
 }
 
 fn modes(path_mode: PathMode) -> Modes {
-    Modes {
-        path_mode,
-        contour_tolerance_mm: None,
-        rounding_distance_mm: None,
-        acceleration_mode: AccelerationMode::Soft,
-        feedforward_active: true,
-    }
+    Modes::new(path_mode)
 }
 
 fn line(number: u64, end: &[f64]) -> Move {
     let block = BlockRef { program: ProgramId(0), line: number as u32, number };
     let feed = Feed::Path { feed_lu_s: 50.0 };
-    Move { block, kind: MoveKind::Line, end: point(end), feed, modes: modes(PathMode::G642), events: Vec::new() }
+    Move {
+        block,
+        kind: MoveKind::Line,
+        end: point(end),
+        feed,
+        modes: modes(PathMode::G642),
+        corner: None,
+        events: Vec::new(),
+    }
 }
 
 fn polyline(points: &[Vec<f64>]) -> Vec<Move> {
@@ -272,13 +274,13 @@ fn rounding_distance_is_where_the_blend_begins() {
         let corners = corners(&contour(&moves));
         corners.first().map_or(0.0, |corner| corner.transition_length_mm)
     };
-    let path = Feed::Path { feed_lu_s: 10.0 };
-    close(with([path, path], [Some(0.5), None]), 0.5, 0.0, "ADIS");
-    close(with([path, path], [Some(50.0), None]), 5.0, 0.0, "half of a block");
-    close(with([path, path], [Some(0.0), Some(0.5)]), 0.0, 0.0, "ADIS=0 is G64");
+    let path = || Feed::Path { feed_lu_s: 10.0 };
+    close(with([path(), path()], [Some(0.5), None]), 0.5, 0.0, "ADIS");
+    close(with([path(), path()], [Some(50.0), None]), 5.0, 0.0, "half of a block");
+    close(with([path(), path()], [Some(0.0), Some(0.5)]), 0.0, 0.0, "ADIS=0 is G64");
     close(with([Feed::Rapid, Feed::Rapid], [Some(2.0), Some(3.0)]), 2.0, 0.0, "ADISPOS between rapids");
-    close(with([Feed::Rapid, path], [Some(2.0), Some(0.5)]), 0.5, 0.0, "ADIS behind a rapid");
-    close(with([path, Feed::Rapid], [Some(0.5), Some(2.0)]), 0.5, 0.0, "ADIS before a rapid");
+    close(with([Feed::Rapid, path()], [Some(2.0), Some(0.5)]), 0.5, 0.0, "ADIS behind a rapid");
+    close(with([path(), Feed::Rapid], [Some(0.5), Some(2.0)]), 0.5, 0.0, "ADIS before a rapid");
     let mut set = machine();
     set.smoothing.rounding_distance_mm = Some(0.4);
     let mut moves = polyline(&[vec![10.0, 0.0], vec![10.0, 10.0]]);
@@ -292,7 +294,7 @@ fn feed_of_a_blend_is_the_lower_one() {
         let mut moves = polyline(&[vec![10.0, 0.0], vec![10.0, 10.0]]);
         moves[0].feed = first;
         moves[1].feed = second;
-        contour(&moves)[1].feed
+        contour(&moves)[1].feed.clone()
     };
     let feed = |feed_lu_s: f64| Feed::Path { feed_lu_s };
     assert_eq!(feed_with(feed(10.0), feed(20.0)), feed(10.0));

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::inputs::{MachineChoice, open_program};
 use super::output::{show, written};
 use crate::base::{AxisKind, PartPoint, units};
-use crate::interpreter::{Interpreter, Listing, Move, MoveKind, feed_per_minute};
+use crate::interpreter::{Interpreter, Listing, Move, MoveKind, feed_per_minute, kind_name};
 use crate::machine::Machine;
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -85,17 +85,10 @@ fn json_of(next: &Move, start: PartPoint, machine: &Machine) -> Value {
     let mut fields = Map::new();
     fields.insert("line".into(), json!(next.block.line));
     fields.insert("block".into(), json!(next.block.number));
-    let kind = match next.kind {
-        MoveKind::Rapid => "rapid",
-        MoveKind::Line => "line",
-        MoveKind::Arc(_) => "arc",
-        MoveKind::Dwell { .. } => "dwell",
-        MoveKind::Function { .. } => "function",
-    };
-    fields.insert("kind".into(), json!(kind));
+    fields.insert("kind".into(), json!(kind_name(&next.kind)));
     fields.insert("end".into(), Value::Object(end));
     fields.insert("feed_mm_min".into(), json!(feed_per_minute(machine, start, next)));
-    match next.kind {
+    match &next.kind {
         MoveKind::Arc(arc) => {
             let names: Vec<&str> = arc.plane.iter().map(|id| machine.axis(*id).name.as_str()).collect();
             fields.insert("plane".into(), json!(names));

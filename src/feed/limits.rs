@@ -109,7 +109,7 @@ impl AxisRules {
 
     /// Limits of a piece on its curve.
     pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
-        let feed = feed_cap(piece.feed);
+        let feed = feed_cap(&piece.feed);
         let jerk_limited = piece.modes.acceleration_mode == AccelerationMode::Soft;
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
@@ -254,10 +254,11 @@ impl PieceLimits {
 }
 
 /// Programmed feed as a cap; a rapid has none.
-fn feed_cap(feed: Feed) -> SpeedCap {
+fn feed_cap(feed: &Feed) -> SpeedCap {
     let velocity_lu_s = match feed {
         Feed::Rapid => f64::INFINITY,
-        Feed::Path { feed_lu_s } => feed_lu_s,
+        Feed::Path { feed_lu_s } => *feed_lu_s,
+        Feed::Varying { feeds_lu_s } => feeds_lu_s.iter().copied().fold(f64::INFINITY, f64::min),
     };
     SpeedCap { velocity_lu_s, limit: Limit { kind: LimitKind::Feed, axis: None } }
 }

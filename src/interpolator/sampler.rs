@@ -238,8 +238,9 @@ fn takes_no_time(piece: &PlannedPiece) -> bool {
 /// F of a piece that moves with one.
 fn programmed_feed_lu_s(piece: &PlannedPiece) -> Option<f64> {
     let contour = &piece.path.contour;
-    match (&contour.kind, contour.feed) {
+    match (&contour.kind, &contour.feed) {
         (PieceKind::Wait { .. }, _) | (_, Feed::Rapid) => None,
-        (_, Feed::Path { feed_lu_s }) => Some(feed_lu_s),
+        (_, Feed::Path { feed_lu_s }) => Some(*feed_lu_s),
+        (_, Feed::Varying { feeds_lu_s }) => feeds_lu_s.first().copied(),
     }
 }

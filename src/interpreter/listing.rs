@@ -44,8 +44,8 @@ impl<'m> Listing<'m> {
 
     /// The line of the next move, without a line end.
     pub fn line(&mut self, next: &Move) -> String {
-        let modes = (self.modes != Some(next.modes)).then(|| self.modes_text(&next.modes));
-        self.modes = Some(next.modes);
+        let modes = (self.modes.as_ref() != Some(&next.modes)).then(|| self.modes_text(&next.modes));
+        self.modes = Some(next.modes.clone());
         let start = std::mem::replace(&mut self.start, next.end);
         format_with(self.machine, start, next, modes.as_deref())
     }
@@ -75,6 +75,7 @@ impl<'m> Listing<'m> {
             words.push(match modes.acceleration_mode {
                 AccelerationMode::Soft => "SOFT".to_owned(),
                 AccelerationMode::Brisk => "BRISK".to_owned(),
+                AccelerationMode::Drive => "DRIVE".to_owned(),
             });
         }
         if before.is_none_or(|before| before.feedforward_active != modes.feedforward_active) {
@@ -102,22 +103,22 @@ pub fn format_move(machine: &Machine, start: PartPoint, shown: &Move) -> String 
 /// Feed of a move that begins at `start` as a programmer writes it: mm/min, or deg/min where only rotary axes move. `None` for
 /// rapids, dwells and functions.
 pub fn feed_per_minute(machine: &Machine, start: PartPoint, shown: &Move) -> Option<f64> {
-    let Feed::Path { feed_lu_s } = shown.feed else { return None };
-    match shown.kind {
+    let feed_lu_s = match &shown.feed {
+        Feed::Rapid => return None,
+        Feed::Path { feed_lu_s } => *feed_lu_s,
+        Feed::Varying { feeds_lu_s } => feeds_lu_s.last().copied()?,
+    };
+    match &shown.kind {
         MoveKind::Line if rotary_alone(machine, start, shown.end) => Some(deg_from_rad(feed_lu_s) * S_PER_MIN),
-        MoveKind::Line | MoveKind::Arc(_) => Some(mm_min_from_mm_s(feed_lu_s)),
-        MoveKind::Rapid | MoveKind::Dwell { .. } | MoveKind::Function { .. } => None,
+        MoveKind::Line | MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
+            Some(mm_min_from_mm_s(feed_lu_s))
+        }
+        _ => None,
     }
 }
 
 fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<&str>) -> String {
-    let kind = match shown.kind {
-        MoveKind::Rapid => "rapid",
-        MoveKind::Line => "line",
-        MoveKind::Arc(_) => "arc",
-        MoveKind::Dwell { .. } => "dwell",
-        MoveKind::Function { .. } => "function",
-    };
+    let kind = kind_name(&shown.kind);
     let mut text = format!("{} {kind}", shown.block.line);
     for id in machine.axis_ids() {
         let axis = machine.axis(id);
@@ -127,17 +128,18 @@ fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<
         };
         add(&mut text, &named(&axis.name, &trimmed(end)));
     }
-    match shown.kind {
+    match &shown.kind {
         MoveKind::Rapid => add(&mut text, "rapid"),
-        MoveKind::Line | MoveKind::Arc(_) => {
+        MoveKind::Line | MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
             let feed = feed_per_minute(machine, start, shown);
             add(&mut text, &feed.map_or_else(|| "rapid".to_owned(), |feed| format!("F{}", trimmed(feed))));
         }
-        MoveKind::Dwell { time_s } => add(&mut text, &format!("{}s", trimmed(time_s))),
+        MoveKind::Dwell { time_s } => add(&mut text, &format!("{}s", trimmed(*time_s))),
         MoveKind::Function { stops: true } => add(&mut text, "stops"),
-        MoveKind::Function { stops: false } => {}
+        MoveKind::StopPreparation => add(&mut text, "stops"),
+        MoveKind::Function { stops: false } | MoveKind::Position(_) | MoveKind::WaitPositioned(_) => {}
     }
-    if let MoveKind::Arc(arc) = shown.kind {
+    if let MoveKind::Arc(arc) = &shown.kind {
         let name = |id: AxisId| machine.axis(id).name.as_str();
         let [first, second] = arc.plane;
         let [a, b] = arc.centre_mm.map(trimmed);
@@ -149,6 +151,20 @@ fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<
     }
     shown.events.iter().for_each(|event| add(&mut text, &event_text(event)));
     text
+}
+
+/// Word for the kind of a move, in listings and JSON.
+pub fn kind_name(kind: &MoveKind) -> &'static str {
+    match kind {
+        MoveKind::Rapid => "rapid",
+        MoveKind::Line => "line",
+        MoveKind::Arc(_) | MoveKind::SpatialArc(_) => "arc",
+        MoveKind::Spline(_) => "spline",
+        MoveKind::Polynomial(_) => "polynomial",
+        MoveKind::Position(_) => "position",
+        MoveKind::Dwell { .. } => "dwell",
+        MoveKind::Function { .. } | MoveKind::WaitPositioned(_) | MoveKind::StopPreparation => "function",
+    }
 }
 
 fn add(text: &mut String, word: &str) {
@@ -181,5 +197,8 @@ fn event_text(event: &Event) -> String {
         Event::Tool(tool) => format!("T={:?}", &**tool),
         Event::Edge(number) => format!("D{number}"),
         Event::Message(text) => format!("MSG({:?})", &**text),
+        Event::Trace(starts) => format!("trace={}", if *starts { "start" } else { "stop" }),
+        Event::HFunction(value) => format!("H{}", trimmed(*value)),
+        Event::Spindle(text) => text.to_string(),
     }
 }

@@ -30,6 +30,6 @@ mod wire;
 
 pub use crate::program::{ProgramSource, known_words};
 pub use check::check;
-pub use listing::{Listing, feed_per_minute, format_move, listing};
+pub use listing::{Listing, feed_per_minute, format_move, kind_name, listing};
 pub use run::Interpreter;
 pub use wire::*;

@@ -2,13 +2,14 @@
 //!
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
-use super::wire::Modes;
+use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
 use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
 use crate::base::{AxisKind, AxisVector};
-use crate::machine::{AccelerationMode, FeedSettings, PathMode};
+use crate::machine::{AccelerationMode, DynamicsMode, FeedSettings, PathMode};
 use crate::program::syntax::Typed;
 use crate::program::words::{Measure, Plane};
+use std::sync::Arc;
 
 /// G group 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,8 +52,18 @@ pub struct Modal {
     pub rounding_distance_mm: Option<f64>,
     /// ADISPOS.
     pub rapid_rounding_distance_mm: Option<f64>,
-    /// SOFT or BRISK.
+    /// G601, G602, G603.
+    pub exact_stop: ExactStop,
+    /// COMPOF, COMPON and so on.
+    pub compressor: Compressor,
+    /// SOFT, BRISK or DRIVE.
     pub acceleration_mode: AccelerationMode,
+    /// DYNNORM and so on.
+    pub dynamics: DynamicsMode,
+    /// ACC, VELOLIM and so on.
+    pub programmed: Option<Arc<ProgrammedLimits>>,
+    /// Active edge of the active tool.
+    pub tool: Option<Arc<ToolOffset>>,
     /// FFWON or FFWOF.
     pub feedforward_active: bool,
     /// F; `None` before the first.
@@ -75,7 +86,12 @@ impl Modal {
             contour_tolerance_mm: None,
             rounding_distance_mm: None,
             rapid_rounding_distance_mm: None,
+            exact_stop: ExactStop::Fine,
+            compressor: Compressor::Off,
             acceleration_mode: settings.default_acceleration_mode,
+            dynamics: DynamicsMode::Norm,
+            programmed: None,
+            tool: None,
             feedforward_active: true,
             feed: None,
             spindle_speed_rpm: 0.0,
@@ -90,7 +106,12 @@ impl Modal {
             path_mode: if exact_stop { PathMode::ExactStop } else { self.path_mode },
             contour_tolerance_mm: self.contour_tolerance_mm,
             rounding_distance_mm: if rapid { self.rapid_rounding_distance_mm } else { self.rounding_distance_mm },
+            exact_stop: self.exact_stop,
+            compressor: self.compressor,
             acceleration_mode: self.acceleration_mode,
+            dynamics: self.dynamics,
+            programmed: self.programmed.clone(),
+            tool: self.tool.clone(),
             feedforward_active: self.feedforward_active,
         }
     }

@@ -111,10 +111,10 @@ impl Interpreter {
         loop {
             if let Some(next) = self.queue.pop_front() {
                 let takes_time = match next.kind {
-                    MoveKind::Function { .. } => false,
+                    MoveKind::Function { .. } | MoveKind::WaitPositioned(_) | MoveKind::StopPreparation => false,
                     MoveKind::Dwell { time_s } => time_s > 0.0,
-                    MoveKind::Rapid | MoveKind::Line => next.end != self.handed_over,
-                    MoveKind::Arc(_) => true,
+                    MoveKind::Rapid | MoveKind::Line | MoveKind::Position(_) => next.end != self.handed_over,
+                    MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => true,
                 };
                 if takes_time {
                     self.idle_blocks = 0;
@@ -205,7 +205,7 @@ impl Interpreter {
         }
         let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
         let modes = self.modal.modes(exact_stop);
-        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, events });
+        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, corner: None, events });
     }
 
     /// Hands a move without motion over.

@@ -2,8 +2,8 @@
 //!
 //! In: nothing (plain data). Out: [`Move`].
 
-use crate::base::{AxisId, PartPoint};
-use crate::machine::{AccelerationMode, PathMode};
+use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
+use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
 use crate::program::{BlockRef, OpenedProgram};
 use std::sync::Arc;
 
@@ -20,29 +20,45 @@ pub struct Move {
     pub feed: Feed,
     /// Modes in force.
     pub modes: Modes,
+    /// RND, RNDM, CHF, CHR: what is put into the corner at its end.
+    pub corner: Option<Box<CornerInsert>>,
     /// What happens at its start, in order of output. Empty for most blocks (an empty `Vec` does not allocate).
     pub events: Vec<Event>,
 }
 
 /// What a move does.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum MoveKind {
     /// G0: straight line at the axes' limits.
     Rapid,
     /// G1.
     Line,
-    /// G2, G3, also as helix.
+    /// G2, G3, CIP, CT with the circle in a plane of two axes, also as helix.
     Arc(ArcGeometry),
+    /// The same with the circle in any other plane.
+    SpatialArc(Box<SpatialArcGeometry>),
+    /// ASPLINE, BSPLINE, CSPLINE.
+    Spline(Arc<PolynomialGeometry>),
+    /// POLY.
+    Polynomial(Arc<PolynomialGeometry>),
+    /// Axes that move on their own, outside the path: POS, POSA, G0 under RTLIOF. All others stand.
+    Position(Arc<[AxisPositioning]>),
     /// G4: stands still.
     Dwell {
         /// Length of the wait.
         time_s: f64,
     },
-    /// No motion: only its events.
+    /// No motion: only its events. `end` differs from the end of the move before where the tool has changed: the axes stand, and the
+    /// tip of another tool is elsewhere.
     Function {
         /// The path must come to rest before it (M0, M1, M2, M30, M6).
         stops: bool,
     },
+    /// WAITP, and the end of a block with POS: the path rests until these axes have reached what POS or POSA gave them.
+    WaitPositioned(PerAxis<bool>),
+    /// STOPRE or the reading of a main-run variable: the path comes to rest, and preparation goes on only when the interpreter has
+    /// been told the time of the main run.
+    StopPreparation,
 }
 
 /// An arc or helix that starts where the move before ended.
@@ -58,8 +74,82 @@ pub struct ArcGeometry {
     pub sweep_rad: f64,
 }
 
-/// Feed of a move.
+/// An arc or helix in a plane that no two axes span, from where the move before ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpatialArcGeometry {
+    /// Unit vectors of the plane, at right angles, components of the linear axes: the angle counts from the first to the second.
+    pub directions: [AxisVector; 2],
+    /// A point on the axis of rotation; components of axes that do not take part are 0.
+    pub centre_mm: AxisVector,
+    /// Radius.
+    pub radius_mm: f64,
+    /// Swept angle, positive from the first direction towards the second, full circles included. What start and end differ in across
+    /// the plane, and all other axes, move linearly with it.
+    pub sweep_rad: f64,
+}
+
+/// Polynomials of the parameter u, one after another; start and end of the move are on them to rounding.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PolynomialGeometry {
+    /// In order, at least one; each begins where the one before ends.
+    pub pieces: Vec<PolynomialPiece>,
+}
+
+/// q(u) = numerator(u) / denominator(u), 0 <= u <= parameter_end_ratio.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PolynomialPiece {
+    /// Last u; the parameter has no unit.
+    pub parameter_end_ratio: f64,
+    /// Coefficients of u^0 .. u^5 of every axis (mm, rad).
+    pub numerator_lu: [AxisVector; 6],
+    /// Coefficients of u^0 .. u^5 common to all geometry axes; [1, 0, 0, 0, 0, 0] for a plain polynomial. Rotary axes are not divided.
+    pub denominator_ratio: [f64; 6],
+}
+
+/// One axis that moves on its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisPositioning {
+    /// Which axis.
+    pub axis: AxisId,
+    /// Where to, from where it was told to go last.
+    pub end_lu: f64,
+    /// FA; `None`: as fast as it can.
+    pub feed_lu_s: Option<f64>,
+}
+
+/// What RND, RNDM, CHF or CHR put into a corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CornerInsert {
+    /// Fillet or chamfer.
+    pub shape: CornerShape,
+    /// Plane in which the corner lies: first and second axis. `None`: the plane has no two linear axes.
+    pub plane: [AxisId; 2],
+    /// FRC or FRCM; `None`: the feed of the block that leads away.
+    pub feed_mm_s: Option<f64>,
+}
+
+/// Fillet or chamfer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CornerShape {
+    /// RND, RNDM.
+    Fillet {
+        /// Radius.
+        radius_mm: f64,
+    },
+    /// CHF: length of the chamfer.
+    ChamferBase {
+        /// Across the corner.
+        length_mm: f64,
+    },
+    /// CHR: what it takes of each block.
+    ChamferLeg {
+        /// Along the motion.
+        length_mm: f64,
+    },
+}
+
+/// Feed of a move.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Feed {
     /// As fast as the axes can.
     Rapid,
@@ -68,10 +158,16 @@ pub enum Feed {
         /// F word.
         feed_lu_s: f64,
     },
+    /// Along the path as `Path`, but changing: highest feed on each of as many stretches of equal length as there are values
+    /// (FLIN, FCUB, G96).
+    Varying {
+        /// One value a stretch, in order; at least one.
+        feeds_lu_s: Arc<[f64]>,
+    },
 }
 
 /// Modes that later rooms act on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Modes {
     /// How the end of this block meets the next (G9 is `ExactStop` for its one block).
     pub path_mode: PathMode,
@@ -79,10 +175,125 @@ pub struct Modes {
     pub contour_tolerance_mm: Option<f64>,
     /// ADIS (or ADISPOS for rapids); `None`: the machine's default.
     pub rounding_distance_mm: Option<f64>,
-    /// SOFT or BRISK.
+    /// What an exact stop waits for.
+    pub exact_stop: ExactStop,
+    /// COMPON and its kin.
+    pub compressor: Compressor,
+    /// SOFT, BRISK or DRIVE.
     pub acceleration_mode: AccelerationMode,
+    /// DYNNORM and its kin: which limits of the axes hold.
+    pub dynamics: DynamicsMode,
+    /// ACC, VELOLIM, JERKLIM, FL, ATOL, OVR and so on; `None` where nothing of it is programmed.
+    pub programmed: Option<Arc<ProgrammedLimits>>,
+    /// Active tool edge; `None`: no tool, length 0.
+    pub tool: Option<Arc<ToolOffset>>,
     /// FFWON or FFWOF; starts on, as the machine file's weights say (MD32630 and docs).
     pub feedforward_active: bool,
+}
+
+/// G group 12: what an exact stop waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum ExactStop {
+    /// G601: actual values inside STOP_LIMIT_FINE.
+    #[default]
+    Fine,
+    /// G602: inside STOP_LIMIT_COARSE.
+    Coarse,
+    /// G603: the set-point has arrived.
+    Setpoint,
+}
+
+/// G group 30.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Compressor {
+    /// COMPOF.
+    #[default]
+    Off,
+    /// COMPON: velocity continuous.
+    On,
+    /// COMPCURV: curvature continuous.
+    Curvature,
+    /// COMPCAD: optimised for the surface.
+    Cad,
+    /// COMPSURF: Top Surface.
+    Surface,
+}
+
+/// What the program says about limits and tolerances of single axes, and factors of all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProgrammedLimits {
+    /// ACC: share of the axis acceleration.
+    pub acceleration_ratio: PerAxis<f64>,
+    /// VELOLIM: share of the axis velocity.
+    pub velocity_ratio: PerAxis<f64>,
+    /// JERKLIM: share of the axis jerk.
+    pub jerk_ratio: PerAxis<f64>,
+    /// FL: highest velocity of a synchronous axis (one outside FGROUP) in feed motions.
+    pub synchronous_max_lu_s: PerAxis<Option<f64>>,
+    /// OVR: share of the programmed feed; of rapids where it is below 1.
+    pub override_ratio: f64,
+    /// OVRRAP: share of the rapid velocity.
+    pub rapid_override_ratio: f64,
+    /// OTOL: tolerance of rotary axes.
+    pub orientation_tolerance_rad: Option<f64>,
+    /// ATOL: tolerance of single axes.
+    pub axis_tolerance_lu: PerAxis<Option<f64>>,
+    /// STOLF: factor of the tolerances between rapids (MD20560).
+    pub rapid_tolerance_ratio: Option<f64>,
+    /// Axes of FGROUP; `None`: the linear axes. The path of these axes runs at the programmed feed.
+    pub feed_group: Option<PerAxis<bool>>,
+    /// FGREF: radius at which a rotary axis of FGROUP counts.
+    pub reference_radius_mm: PerAxis<f64>,
+}
+
+impl Default for ProgrammedLimits {
+    fn default() -> Self {
+        Self {
+            acceleration_ratio: PerAxis::splat(1.0),
+            velocity_ratio: PerAxis::splat(1.0),
+            jerk_ratio: PerAxis::splat(1.0),
+            synchronous_max_lu_s: PerAxis::splat(None),
+            override_ratio: 1.0,
+            rapid_override_ratio: 1.0,
+            orientation_tolerance_rad: None,
+            axis_tolerance_lu: PerAxis::splat(None),
+            rapid_tolerance_ratio: None,
+            feed_group: None,
+            // 1 mm a radian: with FGREF = 180 / pi a degree counts as a millimetre, the control's start value.
+            reference_radius_mm: PerAxis::splat(crate::base::units::DEG_PER_RAD),
+        }
+    }
+}
+
+/// The active edge of the active tool.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToolOffset {
+    /// T word, number or name.
+    pub tool: Arc<str>,
+    /// D.
+    pub edge: u32,
+    /// Position of the axes minus position of the tip, in part space (with the plane of the tool applied, wear included).
+    pub length: AxisVector,
+    /// Radius with wear.
+    pub radius_mm: f64,
+}
+
+impl Modes {
+    /// A path mode, and nothing else said: SOFT, FFWON, no tool.
+    pub fn new(path_mode: PathMode) -> Self {
+        Self {
+            path_mode,
+            contour_tolerance_mm: None,
+            rounding_distance_mm: None,
+            exact_stop: ExactStop::Fine,
+            compressor: Compressor::Off,
+            acceleration_mode: AccelerationMode::Soft,
+            dynamics: DynamicsMode::Norm,
+            programmed: None,
+            tool: None,
+            feedforward_active: true,
+        }
+    }
 }
 
 /// What is output at the start of a block.
@@ -103,4 +314,10 @@ pub enum Event {
     Edge(u32),
     /// MSG("..."); empty clears.
     Message(Arc<str>),
+    /// $AN_SLTRACE = 1 (true): the trace starts; = 2: it stops.
+    Trace(bool),
+    /// H function.
+    HFunction(f64),
+    /// S, M of a spindle other than the master spindle, SPOS: as text, such as "S2=500".
+    Spindle(Arc<str>),
 }

@@ -110,6 +110,8 @@ pub enum AccelerationMode {
     Soft,
     /// Acceleration-limited only.
     Brisk,
+    /// As `Brisk`, with less acceleration at high speed (MD35220).
+    Drive,
 }
 
 /// `[feed] time_law`.

@@ -185,6 +185,9 @@ impl RunEncoder {
                 ("d", format!("D{number}"))
             }
             EventRecord::Message(text) => ("msg", text.to_string()),
+            EventRecord::Trace(starts) => ("trace", if *starts { "start" } else { "stop" }.to_owned()),
+            EventRecord::HFunction(value) => ("h", format!("H{value}")),
+            EventRecord::Spindle(text) => ("spindle", text.to_string()),
             EventRecord::ProgramOpened(name) => ("program", name.to_string()),
             EventRecord::Corner { angle_rad, tolerance_mm, transition_length_mm, feed_mm_s } => {
                 message.angle_deg = Some(deg_from_rad(*angle_rad));

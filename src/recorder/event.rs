@@ -38,6 +38,12 @@ pub enum EventRecord {
         /// Feed at the entry of the blend.
         feed_mm_s: f64,
     },
+    /// $AN_SLTRACE: a trace starts (true) or stops.
+    Trace(bool),
+    /// H function.
+    HFunction(f64),
+    /// S, M or SPOS of a spindle, as text.
+    Spindle(Arc<str>),
     /// Worth knowing: the run goes on.
     Warning {
         /// Stable code.
@@ -63,6 +69,9 @@ impl From<&Event> for EventRecord {
             Event::Tool(tool) => Self::Tool(tool.clone()),
             Event::Edge(number) => Self::Edge(*number),
             Event::Message(text) => Self::Message(text.clone()),
+            Event::Trace(starts) => Self::Trace(*starts),
+            Event::HFunction(value) => Self::HFunction(*value),
+            Event::Spindle(text) => Self::Spindle(text.clone()),
         }
     }
 }

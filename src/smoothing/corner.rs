@@ -29,7 +29,7 @@ const DIRECTION_MIN_RATIO: f64 = 1e-9;
 pub(super) struct Side<'a> {
     /// The whole block as programmed.
     pub curve: &'a Curve,
-    pub feed: Feed,
+    pub feed: &'a Feed,
     pub modes: &'a Modes,
 }
 
@@ -140,7 +140,7 @@ impl Rules {
     /// ADISPOS between two rapids, else ADIS. A block's modes carry the one that is its own: next to one rapid, ADIS stands in
     /// the other block.
     fn rounding_distance_mm(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
-        let modes = if before.feed == Feed::Rapid && after.feed != Feed::Rapid { after.modes } else { before.modes };
+        let modes = if *before.feed == Feed::Rapid && *after.feed != Feed::Rapid { after.modes } else { before.modes };
         modes.rounding_distance_mm.or(self.settings.rounding_distance_mm).unwrap_or(0.0)
     }
 

@@ -64,16 +64,24 @@ impl Smoother {
     pub fn push(&mut self, next: Move, out: &mut impl FnMut(ContourPiece)) {
         self.unrounded.watch(&next.events);
         let linear = self.rules.linear();
-        match next.kind {
+        match &next.kind {
             MoveKind::Rapid | MoveKind::Line => {
                 let line = Line::new(self.position, next.end, linear);
                 self.push_motion(next, Curve::Line(line), out);
             }
             MoveKind::Arc(geometry) => {
-                let arc = Arc::new(self.position, next.end, &geometry, linear);
+                let arc = Arc::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Arc(arc), out);
             }
-            MoveKind::Dwell { time_s } => self.push_wait(next, time_s, out),
+            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) | MoveKind::Position(_) => {
+                let line = Line::new(self.position, next.end, linear);
+                self.push_motion(next, Curve::Line(line), out);
+            }
+            MoveKind::Dwell { time_s } => {
+                let time_s = *time_s;
+                self.push_wait(next, time_s, out);
+            }
+            MoveKind::WaitPositioned(_) | MoveKind::StopPreparation => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: true } => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: false } => self.carry(next, 0),
         }
@@ -131,16 +139,16 @@ impl Smoother {
             Junction::Blend(blend, corner) => {
                 let t = corner.transition_length_mm;
                 after.head_lu = t;
-                let Head { block, feed, modes, .. } = before.head;
-                let mut head =
-                    Head { block, feed: lower(feed, after.head.feed), modes, events: Vec::new(), blocks_begun: 0 };
+                let Head { block, feed, modes, .. } = &before.head;
+                let feed = lower(feed, &after.head.feed);
+                let mut head = Head { block: *block, feed, modes: modes.clone(), events: Vec::new(), blocks_begun: 0 };
                 let blend = if free_lu - t > 0.0 {
                     out(before.part(t, false));
                     blend
                 } else {
                     // The blends take the whole block: this one begins where the last one ended, and with it the block.
                     let start = before.shortened(0.0).start();
-                    head.events = before.head.events;
+                    head.events = before.head.events.clone();
                     head.blocks_begun = before.head.blocks_begun;
                     blend.starting_at(start)
                 };
@@ -187,7 +195,7 @@ impl Smoother {
 
 impl Held {
     fn side(&self) -> Side<'_> {
-        Side { curve: &self.curve, feed: self.head.feed, modes: &self.head.modes }
+        Side { curve: &self.curve, feed: &self.head.feed, modes: &self.head.modes }
     }
 
     /// The block up to its programmed end.
@@ -219,9 +227,15 @@ impl Head {
 }
 
 /// The lower of two feeds.
-fn lower(first: Feed, second: Feed) -> Feed {
-    match (first, second) {
-        (Feed::Rapid, other) | (other, Feed::Rapid) => other,
-        (Feed::Path { feed_lu_s: a }, Feed::Path { feed_lu_s: b }) => Feed::Path { feed_lu_s: a.min(b) },
+fn lower(first: &Feed, second: &Feed) -> Feed {
+    let near = |feed: &Feed, last: bool| match feed {
+        Feed::Rapid => None,
+        Feed::Path { feed_lu_s } => Some(*feed_lu_s),
+        Feed::Varying { feeds_lu_s } => if last { feeds_lu_s.last() } else { feeds_lu_s.first() }.copied(),
+    };
+    match (near(first, true), near(second, false)) {
+        (None, None) => Feed::Rapid,
+        (Some(feed_lu_s), None) | (None, Some(feed_lu_s)) => Feed::Path { feed_lu_s },
+        (Some(a), Some(b)) => Feed::Path { feed_lu_s: a.min(b) },
     }
 }

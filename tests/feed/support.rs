@@ -42,13 +42,7 @@ pub fn point(values: &[f64]) -> PartPoint {
 }
 
 pub fn modes(path_mode: PathMode) -> Modes {
-    Modes {
-        path_mode,
-        contour_tolerance_mm: Some(0.1),
-        rounding_distance_mm: None,
-        acceleration_mode: AccelerationMode::Soft,
-        feedforward_active: true,
-    }
+    Modes { contour_tolerance_mm: Some(0.1), ..Modes::new(path_mode) }
 }
 
 /// A program of moves from the machine's home.
@@ -67,8 +61,8 @@ impl Program {
     pub fn push(&mut self, kind: MoveKind, end: PartPoint) {
         let number = self.moves.len() as u64 + 1;
         let block = BlockRef { program: ProgramId(0), line: number as u32, number };
-        let feed = if kind == MoveKind::Rapid { Feed::Rapid } else { self.feed };
-        self.moves.push(Move { block, kind, end, feed, modes: self.modes, events: Vec::new() });
+        let feed = if kind == MoveKind::Rapid { Feed::Rapid } else { self.feed.clone() };
+        self.moves.push(Move { block, kind, end, feed, modes: self.modes.clone(), corner: None, events: Vec::new() });
     }
 
     pub fn end(&self) -> PartPoint {

@@ -43,7 +43,7 @@ pub fn transition(machine: &Machine, before: &Element, after: &Element) -> Trans
     let smoothing = &machine.smoothing;
     let wanted_mm = if mode == PathMode::G641 {
         // Next to one rapid, ADIS is said by the other block.
-        let modes = if before.feed.is_none() && after.feed.is_some() { after.modes } else { before.modes };
+        let modes = if before.feed.is_none() && after.feed.is_some() { &after.modes } else { &before.modes };
         modes.rounding_distance_mm.or(smoothing.rounding_distance_mm).unwrap_or(0.0)
     } else {
         let reverses = u.iter().zip(&v).any(|(a, b)| a * b < 0.0 && a.abs() > 1e-9 && b.abs() > 1e-9);

@@ -79,10 +79,12 @@ pub fn elements(machine: &Machine, text: &str) -> Elements {
                 continue;
             }
             MoveKind::Function { stops: false } => continue,
+            other => panic!("not judged from outside here: {other:?}"),
         };
         let feed = match next.feed {
             Feed::Rapid => None,
             Feed::Path { feed_lu_s } => Some(feed_lu_s),
+            Feed::Varying { .. } => panic!("not judged from outside here"),
         };
         let line = next.block.line;
         if end != at || arc.is_some() {
