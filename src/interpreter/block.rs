@@ -10,9 +10,8 @@ use super::run::Interpreter;
 use super::value::Value;
 use super::wire::{Event, MoveKind};
 use crate::base::units::S_PER_MIN;
-use crate::machine::{AccelerationMode, PathMode};
-use crate::program::syntax::{Address, AddressValue, Form, Target, Typed, Word, WordKind};
-use crate::program::words::{GFunction, Keyword};
+use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
+use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 use std::sync::Arc;
 
@@ -34,17 +33,17 @@ const DWELL_MAX_S: f64 = 99999.999;
 
 /// What the words of a block come to.
 #[derive(Default)]
-struct Collected {
-    motion: MotionWords,
+pub(super) struct Collected {
+    pub motion: MotionWords,
     /// G groups seen, one bit each.
     groups: u64,
     addresses: Vec<Address>,
-    feed: Option<(Typed, Columns)>,
-    spindle_speed_rpm: Option<(f64, Columns)>,
-    frame: Option<(Keyword, Columns)>,
+    pub feed: Option<(Typed, Columns)>,
+    pub spindle_speed_rpm: Option<(f64, Columns)>,
+    pub frame: Option<(FrameWord, Columns)>,
     dwell: Option<Columns>,
     /// Output with the motion.
-    events: Vec<Event>,
+    pub events: Vec<Event>,
     /// T and M6: output before the motion where the block has an M6.
     tool_events: Vec<Event>,
     tool_change: bool,
@@ -102,10 +101,7 @@ impl Interpreter {
         match &word.kind {
             WordKind::G(function) => self.g_function(*function, columns, block),
             WordKind::Address(address, value) => self.address(*address, value, columns, block),
-            WordKind::Keyword(keyword) => {
-                self.keyword(*keyword, columns, block);
-                Ok(())
-            }
+            WordKind::Keyword(keyword) => self.keyword(*keyword, columns, block),
             WordKind::Message(text) => {
                 let text = match text {
                     Some(text) => evaluate(text, &self.variables)?.text(),
@@ -128,14 +124,45 @@ impl Interpreter {
                         .label("an R parameter is none"))
                 }
             },
+            WordKind::Indexed { address, index, values } => {
+                self.indexed(*address, index.as_ref(), values, columns, block)
+            }
+            WordKind::Procedure(procedure, given) => self.procedure(*procedure, given, columns, block),
             WordKind::Silent => Ok(()),
             WordKind::NotActedOn(entry) => {
                 self.report_word(entry, columns);
-                if entry.word == "DRIVE" {
-                    self.modal.acceleration_mode = AccelerationMode::Brisk;
-                }
                 Ok(())
             }
+        }
+    }
+
+    /// NAME[index]=value goes to the topic that it belongs to.
+    fn indexed(
+        &mut self,
+        address: IndexedAddress,
+        index: Option<&Expr>,
+        values: &IndexedValue,
+        columns: &Columns,
+        block: &mut Collected,
+    ) -> Outcome<()> {
+        match address {
+            IndexedAddress::Polynomial => self.polynomial(index, values, columns, block),
+            IndexedAddress::AxisTolerance => self.axis_tolerance(index, values, columns),
+            _ => self.feed_indexed(address, index, values, columns, block),
+        }
+    }
+
+    /// NAME(arguments) goes to the topic that it belongs to.
+    fn procedure(
+        &mut self,
+        procedure: Procedure,
+        given: &[Option<Expr>],
+        columns: &Columns,
+        block: &mut Collected,
+    ) -> Outcome<()> {
+        match procedure {
+            Procedure::HighSpeedSettings => self.high_speed_settings(given, columns),
+            _ => self.feed_procedure(procedure, given, columns, block),
         }
     }
 
@@ -161,14 +188,15 @@ impl Interpreter {
             GFunction::Dwell => block.dwell = Some(columns.clone()),
             GFunction::ExactStopOnce => block.motion.exact_stop = true,
             GFunction::Plane(plane) => self.modal.plane = plane,
-            GFunction::SuppressFrames => block.motion.suppress_frames = true,
+            GFunction::SuppressFrames(_) => block.motion.suppress_frames = true,
+            GFunction::AxialOffset(coarse) => self.axial_offset(coarse, columns, block)?,
+            GFunction::Pole(origin) => self.pole(origin, columns, block)?,
+            GFunction::Limit(upper) => self.limit(upper, columns, block)?,
+            GFunction::ExactStopWindow(window) => self.modal.exact_stop = window,
+            GFunction::FeedType(feed_type) => self.feed_type(feed_type, columns)?,
             // All zero offsets are 0.
             GFunction::ZeroOffset(_) | GFunction::Silent(_) => {}
             GFunction::PathMode(mode) => self.modal.path_mode = mode,
-            GFunction::PathModeAsG642(entry) => {
-                self.report_word(entry, columns);
-                self.modal.path_mode = PathMode::G642;
-            }
             GFunction::Measure(measure) => self.modal.measure = measure,
             GFunction::Absolute(absolute) => self.modal.absolute = absolute,
             GFunction::NotActedOn(entry, _) => self.report_word(entry, columns),
@@ -176,17 +204,28 @@ impl Interpreter {
         Ok(())
     }
 
-    fn keyword(&mut self, keyword: Keyword, columns: &Columns, block: &mut Collected) {
+    fn keyword(&mut self, keyword: Keyword, columns: &Columns, block: &mut Collected) -> Outcome<()> {
         match keyword {
-            Keyword::Soft => self.modal.acceleration_mode = AccelerationMode::Soft,
-            Keyword::Brisk => self.modal.acceleration_mode = AccelerationMode::Brisk,
+            Keyword::Acceleration(mode) => self.modal.acceleration_mode = mode,
+            Keyword::Dynamics(mode) => self.modal.dynamics = mode,
+            Keyword::DynamicsPrecision => return self.dynamics_precision(columns),
+            Keyword::WorkArea(on) => return self.work_area(on, columns),
+            Keyword::Curve(word) => return self.curve(word, columns, block),
+            Keyword::SplineStart(end) => return self.spline_start(end, columns),
+            Keyword::SplineFinish(end) => return self.spline_finish(end, columns),
+            Keyword::PathParameter(with_path) => return self.path_parameter(with_path, columns),
+            Keyword::FeedShape(shape) => return self.feed_shape(shape, columns),
+            Keyword::FeedCorrection(correction) => return self.feed_correction(correction, columns),
+            Keyword::RapidLinear(linear) => return self.rapid_linear(linear, columns),
+            Keyword::Compressor(compressor) => self.modal.compressor = compressor,
             Keyword::FeedforwardOn => self.modal.feedforward_active = true,
             Keyword::FeedforwardOff => self.modal.feedforward_active = false,
             Keyword::SuppressFrames => block.motion.suppress_frames = true,
-            Keyword::Trans | Keyword::AddTrans | Keyword::ClearFrame => block.frame = Some((keyword, columns.clone())),
+            Keyword::Frame(word) => block.frame = Some((word, columns.clone())),
             Keyword::StopPreparation => block.stops = true,
             Keyword::Return => block.ends = true,
         }
+        Ok(())
     }
 
     fn address(
@@ -214,7 +253,15 @@ impl Interpreter {
             return Ok(());
         }
         let typed = Typed(number(&value.value, &self.variables)?);
-        let plain = matches!(address, Address::Axis(_) | Address::Centre(_)) || value.form == Form::Modal;
+        let has_form = matches!(
+            address,
+            Address::Axis(_)
+                | Address::Centre(_)
+                | Address::Intermediate(_)
+                | Address::PolarAngle
+                | Address::PolarRadius
+        );
+        let plain = has_form || value.form == Form::Modal;
         if !plain {
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "AC, IC and their kin are for axes")
                 .label("expected a plain value"));
@@ -252,6 +299,29 @@ impl Interpreter {
                 self.modal.contour_tolerance_mm = (typed.0 >= 0.0).then(|| self.modal.length_mm(typed));
             }
             Address::Tool => {}
+            Address::OpeningAngle
+            | Address::PolarAngle
+            | Address::PolarRadius
+            | Address::Intermediate(_)
+            | Address::PointWeight
+            | Address::SplineDegree
+            | Address::ParameterLength => self.curve_address(address, typed, value.form, columns, block)?,
+            Address::OrientationTolerance
+            | Address::RapidToleranceFactor
+            | Address::Fillet
+            | Address::FilletModal
+            | Address::Chamfer
+            | Address::ChamferLeg
+            | Address::CornerFeed
+            | Address::CornerFeedModal => self.path_address(address, typed, columns, block)?,
+            Address::PlaneRotation => self.plane_rotation(typed, columns, block)?,
+            Address::BlockFeed
+            | Address::SpindleLimit
+            | Address::Override
+            | Address::RapidOverride
+            | Address::H
+            | Address::SpindleSpeedOf(_)
+            | Address::MOf(_) => self.feed_address(address, typed, columns, block)?,
         }
         Ok(())
     }
@@ -333,25 +403,6 @@ impl Interpreter {
             (None, None) => Err(missing(columns, "G4 without a time")),
         }
     }
-
-    /// TRANS replaces the whole translation, ATRANS adds to it; axis words are offsets here.
-    fn frame(&mut self, frame: Keyword, block: &mut Collected, columns: &Columns) -> Outcome<()> {
-        let words = std::mem::take(&mut block.motion);
-        if words.has_circle_words() {
-            return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "a frame and a circle in one block")
-                .label("expected a block of its own"));
-        }
-        if frame != Keyword::AddTrans {
-            self.modal.translation_lu = crate::base::AxisVector::zero();
-        }
-        let machine = self.machine.clone();
-        for id in machine.axis_ids() {
-            if let Some(word) = &words.axes[id] {
-                self.modal.translation_lu[id] += self.modal.position_lu(machine.axis(id).kind, word.typed);
-            }
-        }
-        Ok(())
-    }
 }
 
 fn m_function(number: u32, block: &mut Collected) {
@@ -390,9 +441,14 @@ fn turns(typed: Typed, columns: &Columns) -> Outcome<u32> {
         .label(format!("expected 0 to {TURNS_MAX}")))
 }
 
-fn whole(typed: Typed, columns: &Columns, address: &str) -> Outcome<u32> {
+pub(super) fn whole(typed: Typed, columns: &Columns, address: &str) -> Outcome<u32> {
     whole_number(typed.0).ok_or_else(|| {
         Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{address}{} is not possible", typed.0))
             .label("expected a whole number from 0 to 2147483647")
     })
+}
+
+/// The finding for a word that is known and not built.
+pub(super) fn not_built(word: &str, columns: &Columns) -> Box<Fault> {
+    Fault::new(codes::NOT_BUILT, columns.clone(), format!("{word}: not built yet")).label("not built yet")
 }

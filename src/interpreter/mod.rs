@@ -18,11 +18,15 @@
 mod arc;
 mod block;
 mod check;
+mod curve_words;
 mod evaluate;
+mod feed_words;
 mod flow;
+mod frame_words;
 mod listing;
 mod modal;
 mod motion;
+mod path_words;
 mod run;
 mod value;
 mod variables;

@@ -4,6 +4,7 @@
 
 use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
+pub use crate::program::words::{Compressor, ExactStop};
 use crate::program::{BlockRef, OpenedProgram};
 use std::sync::Arc;
 
@@ -189,34 +190,6 @@ pub struct Modes {
     pub tool: Option<Arc<ToolOffset>>,
     /// FFWON or FFWOF; starts on, as the machine file's weights say (MD32630 and docs).
     pub feedforward_active: bool,
-}
-
-/// G group 12: what an exact stop waits for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum ExactStop {
-    /// G601: actual values inside STOP_LIMIT_FINE.
-    #[default]
-    Fine,
-    /// G602: inside STOP_LIMIT_COARSE.
-    Coarse,
-    /// G603: the set-point has arrived.
-    Setpoint,
-}
-
-/// G group 30.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Compressor {
-    /// COMPOF.
-    #[default]
-    Off,
-    /// COMPON: velocity continuous.
-    On,
-    /// COMPCURV: curvature continuous.
-    Curvature,
-    /// COMPCAD: optimised for the surface.
-    Cad,
-    /// COMPSURF: Top Surface.
-    Surface,
 }
 
 /// What the program says about limits and tolerances of single axes, and factors of all.

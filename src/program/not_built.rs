@@ -4,28 +4,13 @@
 
 /// Words with what is missing, in groups.
 pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
-    (&["ASPLINE", "BSPLINE", "CSPLINE", "POLY", "PO", "PW", "SD", "PL"], "splines and polynomials are not built yet"),
-    (&["CIP", "CT", "AR", "I1", "J1", "K1"], "this form of circle is not built yet: use G2 or G3 with I, J, K or CR"),
-    (&["AP", "RP", "G110", "G111", "G112"], "polar coordinates are not built yet"),
     (&["G33", "G34", "G35", "G63", "G331", "G332"], "threads are not built yet"),
+    (&["FZ"], "a feed for each tooth is not built yet: use F in mm/min with G94"),
     (
-        &[
-            "G93", "G95", "G96", "G97", "G931", "G942", "G952", "G961", "G962", "G971", "G972", "G973", "FB", "FZ",
-            "FLIN", "FCUB",
-        ],
-        "this kind of feed is not built yet: use F in mm/min with G94",
+        &["TOFRAME", "TOROT", "TOROTX", "TOROTY", "TOROTZ", "TOFRAMEX", "TOFRAMEY", "TOFRAMEZ", "PAROT"],
+        "frames from the orientation of the tool are not built yet",
     ),
-    (&["RND", "RNDM", "CHF", "CHR", "FRC", "FRCM"], "fillets and chamfers are not built yet"),
-    (
-        &[
-            "AROT", "ROTS", "AROTS", "CROTS", "RPL", "ASCALE", "AMIRROR", "G58", "G59", "CTRANS", "CROT", "CSCALE",
-            "CMIRROR", "CFINE", "TOFRAME", "TOROT", "TOROTX", "TOROTY", "TOROTZ", "TOFRAMEX", "TOFRAMEY", "TOFRAMEZ",
-            "PAROT", "MEAFRAME",
-        ],
-        "rotated, scaled and mirrored frames are not built yet: only TRANS and ATRANS",
-    ),
-    (&["POS", "POSA", "POSP", "WAITP", "OS", "OSP1", "OSP2"], "positioning axes are not built yet"),
-    (&["G25", "G26"], "working-area and spindle limits from the program are not built yet"),
+    (&["OS", "OSP1", "OSP2"], "oscillation is not built yet"),
     (&["G74", "G75"], "approaching fixed points is not built yet"),
     (
         &[
@@ -53,6 +38,6 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
 
 /// Functions of expressions that are not built.
 pub(super) const FUNCTIONS_NOT_BUILT: &[&str] = &[
-    "STRLEN", "SUBSTR", "TOUPPER", "TOLOWER", "INDEX", "RINDEX", "MINDEX", "NUMBER", "ISNUMBER", "AXNAME", "ISAXIS",
-    "AXSTRING", "ISVAR",
+    "CTRANS", "CROT", "CROTS", "CSCALE", "CMIRROR", "CFINE", "MEAFRAME", "STRLEN", "SUBSTR", "TOUPPER", "TOLOWER",
+    "INDEX", "RINDEX", "MINDEX", "NUMBER", "ISNUMBER", "AXNAME", "ISAXIS", "AXSTRING", "ISVAR",
 ];

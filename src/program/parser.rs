@@ -10,10 +10,13 @@ use super::expression::{arguments, expected, expression, indices, not_built, unu
 use super::lexer::{Lexer, Number, Token};
 use super::statements::{initial, statement};
 use super::syntax::{
-    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, Initial, Statement, Target, Word, WordKind,
+    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, IndexedValue, Initial, Statement, Target, Word,
+    WordKind,
 };
-use super::words::{self, Control, Keyword, NotActedOn, Role};
+use super::words::{self, Control, IndexedAddress, NotActedOn, Role};
 
+/// Values that PO may have: the end point and coefficients.
+const COEFFICIENTS_MAX: usize = 8;
 /// Highest number of a tool, an edge or an M function.
 const INTEGER_MAX: f64 = 2_147_483_647.0;
 
@@ -231,13 +234,13 @@ impl<'a> WordParser<'_, 'a, '_> {
         }
         match (letter, words::role(name)) {
             (_, Some(Role::NotBuilt(reason))) => Err(not_built(name, reason, name_columns)),
+            (_, Some(Role::Address(address))) => Ok(WordKind::Address(address, self.address_value()?)),
             (b'S' | b'M' | b'T' | b'D' | b'H', _) => {
                 let value = self.address_value()?;
                 match (letter, number) {
-                    (_, Some(1)) => self.address(letter, value),
-                    (b'M', _) => not_acted_on("Mn="),
-                    (b'H', _) => not_acted_on("H"),
-                    _ => not_acted_on("Sn="),
+                    (b'S', Some(number @ 2..)) => Ok(WordKind::Address(Address::SpindleSpeedOf(number), value)),
+                    (b'M', Some(number @ 2..)) => Ok(WordKind::Address(Address::MOf(number), value)),
+                    _ => self.address(letter, value),
                 }
             }
             _ => Err(self.unknown_axis(name, name_columns)),
@@ -308,7 +311,7 @@ impl<'a> WordParser<'_, 'a, '_> {
             b'I' => Address::Centre(0),
             b'J' => Address::Centre(1),
             b'K' => Address::Centre(2),
-            b'H' => return not_acted_on("H"),
+            b'H' => Address::H,
             b'L' | b'P' => {
                 return Err(Fault::new(
                     codes::NO_SUBPROGRAMS,
@@ -395,17 +398,17 @@ impl<'a> WordParser<'_, 'a, '_> {
             return Ok(WordKind::Address(Address::Axis(axis), self.address_value()?));
         }
         match words::role(name) {
-            Some(Role::Keyword(Keyword::ClearFrame)) if !self.lexer.at_end() => Err(not_built(
-                name,
-                "rotated, scaled and mirrored frames are not built yet: only TRANS and ATRANS",
-                columns,
-            )),
             Some(Role::Keyword(keyword)) => Ok(WordKind::Keyword(keyword)),
             Some(Role::Address(address)) => {
                 if !self.lexer.take("=") {
                     return Err(expected(self.lexer, &format!("`=` after {name}")));
                 }
                 Ok(WordKind::Address(address, self.address_value()?))
+            }
+            Some(Role::Indexed(address)) => self.indexed(address, name),
+            Some(Role::Procedure(procedure)) => {
+                let given = if self.lexer.take("(") { arguments(self.lexer, ")", false)? } else { Vec::new() };
+                Ok(WordKind::Procedure(procedure, given))
             }
             Some(Role::Message) => self.message(),
             Some(Role::Silent) => {
@@ -428,6 +431,45 @@ impl<'a> WordParser<'_, 'a, '_> {
             }
             Some(Role::NotBuilt(reason) | Role::FunctionNotBuilt(reason)) => Err(not_built(name, reason, columns)),
             None => Err(self.unknown_word(name, columns)),
+        }
+    }
+
+    /// `ACC[X]=50`, `SPOS=90`, `PO[X]=(10, 2.5)`, `PO[]=(1, 0.2)`.
+    fn indexed(&mut self, address: IndexedAddress, name: &str) -> Outcome<WordKind> {
+        let mut index = None;
+        if self.lexer.take("[") {
+            if !self.lexer.take("]") {
+                index = Some(expression(self.lexer)?);
+                if !self.lexer.take("]") {
+                    return Err(expected(self.lexer, "an operator or `]`"));
+                }
+            }
+        } else if !matches!(address, IndexedAddress::SpindlePosition | IndexedAddress::SpindlePositionAsync) {
+            return Err(expected(self.lexer, &format!("`[` and an axis after {name}")));
+        }
+        if !self.lexer.take("=") {
+            return Err(expected(self.lexer, &format!("`=` after {name}[...]")));
+        }
+        let values = if address == IndexedAddress::Polynomial && self.lexer.take("(") {
+            IndexedValue::List(self.coefficients()?)
+        } else {
+            IndexedValue::One(self.address_value()?)
+        };
+        Ok(WordKind::Indexed { address, index, values })
+    }
+
+    /// `a, b, c)`: the end point may be AC() or IC().
+    fn coefficients(&mut self) -> Outcome<Vec<Option<AddressValue>>> {
+        let mut values = Vec::new();
+        loop {
+            let gap = matches!(self.lexer.peek(), Token::Symbol("," | ")"));
+            values.push(if gap { None } else { Some(self.address_value()?) });
+            if self.lexer.take(")") {
+                return Ok(values);
+            }
+            if !self.lexer.take(",") || values.len() > COEFFICIENTS_MAX {
+                return Err(expected(self.lexer, "`,` or `)`"));
+            }
         }
     }
 
@@ -472,10 +514,6 @@ impl<'a> WordParser<'_, 'a, '_> {
             .label("not a word of the language")
             .maybe_help(help.or_else(|| (!is_call).then(|| format!("an assignment needs `=`: {name}=..."))))
     }
-}
-
-fn not_acted_on(word: &str) -> Outcome<WordKind> {
-    Ok(NotActedOn::find(word).map_or(WordKind::Silent, WordKind::NotActedOn))
 }
 
 /// The whole number of an address such as M or T, if the value is one and not negative.

@@ -4,7 +4,7 @@
 //! not know its line. Nothing here is evaluated.
 
 use super::codes::Columns;
-use super::words::{Function, GFunction, Keyword, NotActedOn};
+use super::words::{Function, GFunction, IndexedAddress, Keyword, NotActedOn, Procedure};
 use crate::base::AxisId;
 use std::sync::Arc;
 
@@ -211,6 +211,17 @@ pub enum WordKind {
     Address(Address, AddressValue),
     /// A word that stands alone.
     Keyword(Keyword),
+    /// NAME[index]=value; without index where the word allows it.
+    Indexed {
+        /// Which.
+        address: IndexedAddress,
+        /// Axis or spindle.
+        index: Option<Expr>,
+        /// Value, or a list of them for PO.
+        values: IndexedValue,
+    },
+    /// NAME(arguments) of the control itself.
+    Procedure(Procedure, Vec<Option<Expr>>),
     /// MSG.
     Message(Option<Expr>),
     /// Variable or R parameter = value.
@@ -221,6 +232,15 @@ pub enum WordKind {
     Silent,
     /// Known, with an effect that is not simulated.
     NotActedOn(&'static NotActedOn),
+}
+
+/// Value of an indexed address.
+#[derive(Clone, Debug, PartialEq)]
+pub enum IndexedValue {
+    /// One value.
+    One(AddressValue),
+    /// (a, b, c): coefficients of PO.
+    List(Vec<Option<AddressValue>>),
 }
 
 /// An address that is acted on.
@@ -250,6 +270,52 @@ pub enum Address {
     RapidRoundingDistance,
     /// CTOL.
     ContourTolerance,
+    /// OTOL.
+    OrientationTolerance,
+    /// STOLF.
+    RapidToleranceFactor,
+    /// RND.
+    Fillet,
+    /// RNDM.
+    FilletModal,
+    /// CHF.
+    Chamfer,
+    /// CHR.
+    ChamferLeg,
+    /// FRC.
+    CornerFeed,
+    /// FRCM.
+    CornerFeedModal,
+    /// AR.
+    OpeningAngle,
+    /// AP.
+    PolarAngle,
+    /// RP.
+    PolarRadius,
+    /// I1, J1, K1: 0, 1, 2.
+    Intermediate(u8),
+    /// PW.
+    PointWeight,
+    /// SD.
+    SplineDegree,
+    /// PL.
+    ParameterLength,
+    /// RPL.
+    PlaneRotation,
+    /// FB.
+    BlockFeed,
+    /// LIMS.
+    SpindleLimit,
+    /// OVR.
+    Override,
+    /// OVRRAP.
+    RapidOverride,
+    /// H.
+    H,
+    /// S2 and so on.
+    SpindleSpeedOf(u32),
+    /// M2= and so on: an M function of a spindle other than spindle 1.
+    MOf(u32),
 }
 
 /// Value of an address.

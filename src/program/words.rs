@@ -6,7 +6,7 @@
 pub use super::not_acted_on::{NOT_ACTED_ON, NotActedOn};
 use super::not_built::{FUNCTIONS_NOT_BUILT, NOT_BUILT};
 use super::syntax::{Address, Direction};
-use crate::machine::PathMode;
+use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
 use std::sync::OnceLock;
 
 /// What a word is.
@@ -16,6 +16,10 @@ pub enum Role {
     Keyword(Keyword),
     /// NAME=value, acted on.
     Address(Address),
+    /// NAME[axis]=value, acted on.
+    Indexed(IndexedAddress),
+    /// NAME(arguments), acted on.
+    Procedure(Procedure),
     /// Opens a statement that fills the block.
     Control(Control),
     /// Function of an expression.
@@ -37,26 +41,254 @@ pub enum Role {
 /// Words that stand alone and are acted on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keyword {
-    /// SOFT.
-    Soft,
-    /// BRISK.
-    Brisk,
+    /// SOFT, BRISK, DRIVE.
+    Acceleration(AccelerationMode),
+    /// DYNNORM and its kin.
+    Dynamics(DynamicsMode),
+    /// DYNPREC.
+    DynamicsPrecision,
     /// FFWON.
     FeedforwardOn,
     /// FFWOF.
     FeedforwardOff,
     /// SUPA.
     SuppressFrames,
-    /// TRANS.
-    Trans,
-    /// ATRANS.
-    AddTrans,
-    /// ROT, SCALE or MIRROR alone: delete the programmable frame, as TRANS alone does.
-    ClearFrame,
+    /// TRANS, ROT, SCALE, MIRROR and their kin.
+    Frame(FrameWord),
+    /// WALIMON (true), WALIMOF.
+    WorkArea(bool),
+    /// CIP, CT, ASPLINE, BSPLINE, CSPLINE, POLY: G group 1.
+    Curve(CurveWord),
+    /// BAUTO, BNAT, BTAN.
+    SplineStart(SplineEnd),
+    /// EAUTO, ENAT, ETAN.
+    SplineFinish(SplineEnd),
+    /// UPATH (true), SPATH.
+    PathParameter(bool),
+    /// FNORM, FLIN, FCUB.
+    FeedShape(FeedShape),
+    /// CFC, CFTCP, CFIN.
+    FeedCorrection(FeedCorrection),
+    /// RTLION (true), RTLIOF.
+    RapidLinear(bool),
+    /// COMPOF, COMPON and its kin.
+    Compressor(Compressor),
     /// STOPRE.
     StopPreparation,
     /// RET.
     Return,
+}
+
+/// Words of the programmable frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameWord {
+    /// TRANS.
+    Trans,
+    /// ATRANS.
+    AddTrans,
+    /// ROT.
+    Rot,
+    /// AROT.
+    AddRot,
+    /// ROTS: solid angles.
+    RotSolid,
+    /// AROTS.
+    AddRotSolid,
+    /// SCALE.
+    Scale,
+    /// ASCALE.
+    AddScale,
+    /// MIRROR.
+    Mirror,
+    /// AMIRROR.
+    AddMirror,
+}
+
+/// Curves of G group 1 that are words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CurveWord {
+    /// CIP: circle through an intermediate point.
+    ThreePoints,
+    /// CT: tangential circle.
+    Tangential,
+    /// ASPLINE.
+    Akima,
+    /// BSPLINE.
+    BSpline,
+    /// CSPLINE.
+    Cubic,
+    /// POLY.
+    Polynomial,
+}
+
+/// How a spline begins or ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum SplineEnd {
+    /// BAUTO, EAUTO: from the first or last points.
+    Auto,
+    /// BNAT, ENAT: no curvature.
+    #[default]
+    Natural,
+    /// BTAN, ETAN: tangential to the block before or after.
+    Tangential,
+}
+
+/// G group 37: how F changes over the path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum FeedShape {
+    /// FNORM: constant in a block.
+    #[default]
+    Constant,
+    /// FLIN: linear.
+    Linear,
+    /// FCUB: cubic.
+    Cubic,
+}
+
+/// G group 16: what F means on a circle under tool radius compensation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum FeedCorrection {
+    /// CFC: at the contour.
+    #[default]
+    Contour,
+    /// CFTCP: at the tool centre.
+    Centre,
+    /// CFIN: as CFC at inside contours only.
+    Inside,
+}
+
+/// G group 12: what an exact stop waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum ExactStop {
+    /// G601: actual values inside STOP_LIMIT_FINE.
+    #[default]
+    Fine,
+    /// G602: inside STOP_LIMIT_COARSE.
+    Coarse,
+    /// G603: the set-point has arrived.
+    Setpoint,
+}
+
+/// G group 30.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Compressor {
+    /// COMPOF.
+    #[default]
+    Off,
+    /// COMPON: velocity continuous.
+    On,
+    /// COMPCURV: curvature continuous.
+    Curvature,
+    /// COMPCAD: optimised for the surface.
+    Cad,
+    /// COMPSURF: Top Surface.
+    Surface,
+}
+
+/// G group 15: unit of F, and of S where the cutting speed is constant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum FeedType {
+    /// G93: F is the inverse of the time of the block, 1/min.
+    InverseTime,
+    /// G931: F is the time of the block, s.
+    Time,
+    /// G94: F in mm/min.
+    #[default]
+    PerMinute,
+    /// G95: F in mm a revolution.
+    PerRevolution,
+    /// G942: F as before in mm/min, constant cutting speed off and S kept.
+    PerMinuteKept,
+    /// G952: as G942, mm a revolution.
+    PerRevolutionKept,
+    /// G96: constant cutting speed, F in mm a revolution.
+    CuttingSpeedPerRevolution,
+    /// G961: constant cutting speed, F in mm/min.
+    CuttingSpeedPerMinute,
+    /// G962: constant cutting speed, F as before.
+    CuttingSpeed,
+    /// G97: cutting speed off, F in mm a revolution.
+    SpeedPerRevolution,
+    /// G971: cutting speed off, F in mm/min.
+    SpeedPerMinute,
+    /// G972: cutting speed off, F as before.
+    Speed,
+    /// G973: G97 without spindle-speed limit.
+    SpeedPerRevolutionFree,
+}
+
+/// From where polar coordinates count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoleOrigin {
+    /// G110: from the last programmed position.
+    Position,
+    /// G111: from the zero point of the workpiece.
+    Zero,
+    /// G112: from the last pole.
+    Pole,
+}
+
+/// Which frames are suppressed in a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Suppression {
+    /// G53: settable and programmable.
+    Settable,
+    /// G153: basic too.
+    Basic,
+    /// SUPA: all offsets.
+    All,
+}
+
+/// NAME[axis]=value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IndexedAddress {
+    /// ACC.
+    Acceleration,
+    /// VELOLIM.
+    Velocity,
+    /// JERKLIM.
+    Jerk,
+    /// FL.
+    SynchronousLimit,
+    /// FA.
+    PositioningFeed,
+    /// FGREF.
+    ReferenceRadius,
+    /// ATOL.
+    AxisTolerance,
+    /// OVRA.
+    AxisOverride,
+    /// POS.
+    Position,
+    /// POSA.
+    PositionAsync,
+    /// PO: a list of coefficients, or the denominator without an axis.
+    Polynomial,
+    /// SPOS: also without index.
+    SpindlePosition,
+    /// SPOSA.
+    SpindlePositionAsync,
+}
+
+/// NAME(arguments) of the control itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Procedure {
+    /// FGROUP.
+    FeedGroup,
+    /// WAITP.
+    WaitPositioned,
+    /// WAITS.
+    WaitSpindle,
+    /// SOFTA, BRISKA, DRIVEA.
+    AxisAcceleration(AccelerationMode),
+    /// SPCON, SPCOF.
+    SpindleControl,
+    /// SETMS.
+    MasterSpindle,
+    /// POSP.
+    PositionInParts,
+    /// CYCLE832.
+    HighSpeedSettings,
 }
 
 /// Words that open a statement.
@@ -146,13 +378,21 @@ pub enum GFunction {
     /// G17, G18, G19.
     Plane(Plane),
     /// G53, G153 (SUPA is a keyword).
-    SuppressFrames,
+    SuppressFrames(Suppression),
+    /// G58, G59: programmable axial offset, coarse (true) or fine.
+    AxialOffset(bool),
+    /// G110, G111, G112.
+    Pole(PoleOrigin),
+    /// G25 (false), G26 (true): lower or upper limit of the work area or the spindle speed.
+    Limit(bool),
+    /// G601, G602, G603.
+    ExactStopWindow(ExactStop),
+    /// G93 to G97 and their kin.
+    FeedType(FeedType),
     /// G500, G54 to G57, G505 to G599.
     ZeroOffset(u16),
-    /// G60, G64, G641, G642.
+    /// G60, G64, G641 to G645.
     PathMode(PathMode),
-    /// G643, G644, G645: known, executed as G642.
-    PathModeAsG642(&'static NotActedOn),
     /// G70, G71, G700, G710.
     Measure(Measure),
     /// G90 (true), G91.
@@ -190,10 +430,13 @@ impl GFunction {
     pub fn group(&self) -> u8 {
         match self {
             Self::Rapid | Self::Line | Self::Clockwise | Self::CounterClockwise => 1,
-            Self::Dwell | Self::ExactStopOnce | Self::SuppressFrames => 0,
+            Self::Dwell | Self::ExactStopOnce | Self::SuppressFrames(_) => 0,
+            Self::AxialOffset(_) | Self::Pole(_) | Self::Limit(_) => 3,
+            Self::ExactStopWindow(_) => 12,
+            Self::FeedType(_) => 15,
             Self::Plane(_) => 6,
             Self::ZeroOffset(_) => 8,
-            Self::PathMode(_) | Self::PathModeAsG642(_) => 10,
+            Self::PathMode(_) => 10,
             Self::Measure(_) => 13,
             Self::Absolute(_) => 14,
             Self::Silent(group) | Self::NotActedOn(_, group) => *group,
@@ -213,7 +456,15 @@ pub fn g_function(number: u32) -> Result<GFunction, &'static str> {
         17 => GFunction::Plane(Plane::G17),
         18 => GFunction::Plane(Plane::G18),
         19 => GFunction::Plane(Plane::G19),
-        53 | 153 => GFunction::SuppressFrames,
+        25 => GFunction::Limit(false),
+        26 => GFunction::Limit(true),
+        53 => GFunction::SuppressFrames(Suppression::Settable),
+        153 => GFunction::SuppressFrames(Suppression::Basic),
+        58 => GFunction::AxialOffset(true),
+        59 => GFunction::AxialOffset(false),
+        110 => GFunction::Pole(PoleOrigin::Position),
+        111 => GFunction::Pole(PoleOrigin::Zero),
+        112 => GFunction::Pole(PoleOrigin::Pole),
         54..=57 => GFunction::ZeroOffset((number - 53) as u16),
         500 => GFunction::ZeroOffset(0),
         505..=599 => GFunction::ZeroOffset((number - 500) as u16),
@@ -221,16 +472,33 @@ pub fn g_function(number: u32) -> Result<GFunction, &'static str> {
         64 => GFunction::PathMode(PathMode::G64),
         641 => GFunction::PathMode(PathMode::G641),
         642 => GFunction::PathMode(PathMode::G642),
+        643 => GFunction::PathMode(PathMode::G643),
+        644 => GFunction::PathMode(PathMode::G644),
+        645 => GFunction::PathMode(PathMode::G645),
         70 => GFunction::Measure(Measure::InchGeometry),
         71 | 710 => GFunction::Measure(Measure::Metric),
         700 => GFunction::Measure(Measure::Inch),
         90 => GFunction::Absolute(true),
         91 => GFunction::Absolute(false),
         40 => GFunction::Silent(7),
-        94 => GFunction::Silent(15),
         290 => GFunction::Silent(47),
         450 | 451 => GFunction::Silent(18),
-        601 => GFunction::Silent(12),
+        601 => GFunction::ExactStopWindow(ExactStop::Fine),
+        602 => GFunction::ExactStopWindow(ExactStop::Coarse),
+        603 => GFunction::ExactStopWindow(ExactStop::Setpoint),
+        93 => GFunction::FeedType(FeedType::InverseTime),
+        931 => GFunction::FeedType(FeedType::Time),
+        94 => GFunction::FeedType(FeedType::PerMinute),
+        95 => GFunction::FeedType(FeedType::PerRevolution),
+        942 => GFunction::FeedType(FeedType::PerMinuteKept),
+        952 => GFunction::FeedType(FeedType::PerRevolutionKept),
+        96 => GFunction::FeedType(FeedType::CuttingSpeedPerRevolution),
+        961 => GFunction::FeedType(FeedType::CuttingSpeedPerMinute),
+        962 => GFunction::FeedType(FeedType::CuttingSpeed),
+        97 => GFunction::FeedType(FeedType::SpeedPerRevolution),
+        971 => GFunction::FeedType(FeedType::SpeedPerMinute),
+        972 => GFunction::FeedType(FeedType::Speed),
+        973 => GFunction::FeedType(FeedType::SpeedPerRevolutionFree),
         _ => return other_g_function(number),
     })
 }
@@ -238,12 +506,9 @@ pub fn g_function(number: u32) -> Result<GFunction, &'static str> {
 fn other_g_function(number: u32) -> Result<GFunction, &'static str> {
     let group = match number {
         41 | 42 => 7,
-        62 | 621 => 57,
-        602 | 603 => 12,
-        _ => 10,
+        _ => 57,
     };
     match role(&format!("G{number}")) {
-        Some(Role::NotActedOn(entry)) if group == 10 => Ok(GFunction::PathModeAsG642(entry)),
         Some(Role::NotActedOn(entry)) => Ok(GFunction::NotActedOn(entry, group)),
         Some(Role::NotBuilt(reason)) => Err(reason),
         _ => Err(""),
@@ -288,16 +553,82 @@ fn table() -> &'static [(&'static str, Role)] {
 }
 
 const ACTED_ON: &[(&str, Role)] = &[
-    ("SOFT", Role::Keyword(Keyword::Soft)),
-    ("BRISK", Role::Keyword(Keyword::Brisk)),
+    ("SOFT", Role::Keyword(Keyword::Acceleration(AccelerationMode::Soft))),
+    ("BRISK", Role::Keyword(Keyword::Acceleration(AccelerationMode::Brisk))),
+    ("DRIVE", Role::Keyword(Keyword::Acceleration(AccelerationMode::Drive))),
+    ("DYNNORM", Role::Keyword(Keyword::Dynamics(DynamicsMode::Norm))),
+    ("DYNPOS", Role::Keyword(Keyword::Dynamics(DynamicsMode::Position))),
+    ("DYNROUGH", Role::Keyword(Keyword::Dynamics(DynamicsMode::Rough))),
+    ("DYNSEMIFIN", Role::Keyword(Keyword::Dynamics(DynamicsMode::SemiFinish))),
+    ("DYNFINISH", Role::Keyword(Keyword::Dynamics(DynamicsMode::Finish))),
+    ("DYNPREC", Role::Keyword(Keyword::DynamicsPrecision)),
     ("FFWON", Role::Keyword(Keyword::FeedforwardOn)),
     ("FFWOF", Role::Keyword(Keyword::FeedforwardOff)),
     ("SUPA", Role::Keyword(Keyword::SuppressFrames)),
-    ("TRANS", Role::Keyword(Keyword::Trans)),
-    ("ATRANS", Role::Keyword(Keyword::AddTrans)),
-    ("ROT", Role::Keyword(Keyword::ClearFrame)),
-    ("SCALE", Role::Keyword(Keyword::ClearFrame)),
-    ("MIRROR", Role::Keyword(Keyword::ClearFrame)),
+    ("TRANS", Role::Keyword(Keyword::Frame(FrameWord::Trans))),
+    ("ATRANS", Role::Keyword(Keyword::Frame(FrameWord::AddTrans))),
+    ("ROT", Role::Keyword(Keyword::Frame(FrameWord::Rot))),
+    ("AROT", Role::Keyword(Keyword::Frame(FrameWord::AddRot))),
+    ("ROTS", Role::Keyword(Keyword::Frame(FrameWord::RotSolid))),
+    ("AROTS", Role::Keyword(Keyword::Frame(FrameWord::AddRotSolid))),
+    ("SCALE", Role::Keyword(Keyword::Frame(FrameWord::Scale))),
+    ("ASCALE", Role::Keyword(Keyword::Frame(FrameWord::AddScale))),
+    ("MIRROR", Role::Keyword(Keyword::Frame(FrameWord::Mirror))),
+    ("AMIRROR", Role::Keyword(Keyword::Frame(FrameWord::AddMirror))),
+    ("RPL", Role::Address(Address::PlaneRotation)),
+    ("WALIMON", Role::Keyword(Keyword::WorkArea(true))),
+    ("WALIMOF", Role::Keyword(Keyword::WorkArea(false))),
+    ("CIP", Role::Keyword(Keyword::Curve(CurveWord::ThreePoints))),
+    ("CT", Role::Keyword(Keyword::Curve(CurveWord::Tangential))),
+    ("ASPLINE", Role::Keyword(Keyword::Curve(CurveWord::Akima))),
+    ("BSPLINE", Role::Keyword(Keyword::Curve(CurveWord::BSpline))),
+    ("CSPLINE", Role::Keyword(Keyword::Curve(CurveWord::Cubic))),
+    ("POLY", Role::Keyword(Keyword::Curve(CurveWord::Polynomial))),
+    ("BAUTO", Role::Keyword(Keyword::SplineStart(SplineEnd::Auto))),
+    ("BNAT", Role::Keyword(Keyword::SplineStart(SplineEnd::Natural))),
+    ("BTAN", Role::Keyword(Keyword::SplineStart(SplineEnd::Tangential))),
+    ("EAUTO", Role::Keyword(Keyword::SplineFinish(SplineEnd::Auto))),
+    ("ENAT", Role::Keyword(Keyword::SplineFinish(SplineEnd::Natural))),
+    ("ETAN", Role::Keyword(Keyword::SplineFinish(SplineEnd::Tangential))),
+    ("UPATH", Role::Keyword(Keyword::PathParameter(true))),
+    ("SPATH", Role::Keyword(Keyword::PathParameter(false))),
+    ("FNORM", Role::Keyword(Keyword::FeedShape(FeedShape::Constant))),
+    ("FLIN", Role::Keyword(Keyword::FeedShape(FeedShape::Linear))),
+    ("FCUB", Role::Keyword(Keyword::FeedShape(FeedShape::Cubic))),
+    ("CFC", Role::Keyword(Keyword::FeedCorrection(FeedCorrection::Contour))),
+    ("CFTCP", Role::Keyword(Keyword::FeedCorrection(FeedCorrection::Centre))),
+    ("CFIN", Role::Keyword(Keyword::FeedCorrection(FeedCorrection::Inside))),
+    ("RTLION", Role::Keyword(Keyword::RapidLinear(true))),
+    ("RTLIOF", Role::Keyword(Keyword::RapidLinear(false))),
+    ("COMPOF", Role::Keyword(Keyword::Compressor(Compressor::Off))),
+    ("COMPON", Role::Keyword(Keyword::Compressor(Compressor::On))),
+    ("COMPCURV", Role::Keyword(Keyword::Compressor(Compressor::Curvature))),
+    ("COMPCAD", Role::Keyword(Keyword::Compressor(Compressor::Cad))),
+    ("COMPSURF", Role::Keyword(Keyword::Compressor(Compressor::Surface))),
+    ("ACC", Role::Indexed(IndexedAddress::Acceleration)),
+    ("VELOLIM", Role::Indexed(IndexedAddress::Velocity)),
+    ("JERKLIM", Role::Indexed(IndexedAddress::Jerk)),
+    ("FL", Role::Indexed(IndexedAddress::SynchronousLimit)),
+    ("FA", Role::Indexed(IndexedAddress::PositioningFeed)),
+    ("FGREF", Role::Indexed(IndexedAddress::ReferenceRadius)),
+    ("ATOL", Role::Indexed(IndexedAddress::AxisTolerance)),
+    ("OVRA", Role::Indexed(IndexedAddress::AxisOverride)),
+    ("POS", Role::Indexed(IndexedAddress::Position)),
+    ("POSA", Role::Indexed(IndexedAddress::PositionAsync)),
+    ("PO", Role::Indexed(IndexedAddress::Polynomial)),
+    ("SPOS", Role::Indexed(IndexedAddress::SpindlePosition)),
+    ("SPOSA", Role::Indexed(IndexedAddress::SpindlePositionAsync)),
+    ("FGROUP", Role::Procedure(Procedure::FeedGroup)),
+    ("WAITP", Role::Procedure(Procedure::WaitPositioned)),
+    ("WAITS", Role::Procedure(Procedure::WaitSpindle)),
+    ("SOFTA", Role::Procedure(Procedure::AxisAcceleration(AccelerationMode::Soft))),
+    ("BRISKA", Role::Procedure(Procedure::AxisAcceleration(AccelerationMode::Brisk))),
+    ("DRIVEA", Role::Procedure(Procedure::AxisAcceleration(AccelerationMode::Drive))),
+    ("SPCON", Role::Procedure(Procedure::SpindleControl)),
+    ("SPCOF", Role::Procedure(Procedure::SpindleControl)),
+    ("SETMS", Role::Procedure(Procedure::MasterSpindle)),
+    ("POSP", Role::Procedure(Procedure::PositionInParts)),
+    ("CYCLE832", Role::Procedure(Procedure::HighSpeedSettings)),
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
     ("RET", Role::Keyword(Keyword::Return)),
     ("CR", Role::Address(Address::Radius)),
@@ -305,6 +636,27 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("ADIS", Role::Address(Address::RoundingDistance)),
     ("ADISPOS", Role::Address(Address::RapidRoundingDistance)),
     ("CTOL", Role::Address(Address::ContourTolerance)),
+    ("OTOL", Role::Address(Address::OrientationTolerance)),
+    ("STOLF", Role::Address(Address::RapidToleranceFactor)),
+    ("RND", Role::Address(Address::Fillet)),
+    ("RNDM", Role::Address(Address::FilletModal)),
+    ("CHF", Role::Address(Address::Chamfer)),
+    ("CHR", Role::Address(Address::ChamferLeg)),
+    ("FRC", Role::Address(Address::CornerFeed)),
+    ("FRCM", Role::Address(Address::CornerFeedModal)),
+    ("AR", Role::Address(Address::OpeningAngle)),
+    ("AP", Role::Address(Address::PolarAngle)),
+    ("RP", Role::Address(Address::PolarRadius)),
+    ("I1", Role::Address(Address::Intermediate(0))),
+    ("J1", Role::Address(Address::Intermediate(1))),
+    ("K1", Role::Address(Address::Intermediate(2))),
+    ("PW", Role::Address(Address::PointWeight)),
+    ("SD", Role::Address(Address::SplineDegree)),
+    ("PL", Role::Address(Address::ParameterLength)),
+    ("FB", Role::Address(Address::BlockFeed)),
+    ("LIMS", Role::Address(Address::SpindleLimit)),
+    ("OVR", Role::Address(Address::Override)),
+    ("OVRRAP", Role::Address(Address::RapidOverride)),
     ("MSG", Role::Message),
     ("DEF", Role::Control(Control::Define)),
     ("PROC", Role::Control(Control::Declaration)),
@@ -354,21 +706,16 @@ const SYNTAX: &[&str] = &[
 /// Words whose effect is already the state of this kernel, or that only matter together with words that are not built:
 /// accepted without a warning, because the result is the same with and without them.
 const SILENT: &[&str] = &[
-    // Transformation, compressor, feed profile: off, as they are.
-    "COMPOF",
-    "FNORM",
+    // Transformation: off, as it is.
     "TRAFOOF",
     "CP",
     "CPRECOF",
     "DIAMOF",
     "FENDNORM",
-    "DYNNORM",
     "PAROTOF",
     "TOROTOF",
     "GWPSOF",
     "TCOABS",
-    // G0 as a straight line is what is done.
-    "RTLION",
     // Only with an orientation transformation.
     "ORIAXES",
     "ORIEULER",
@@ -380,25 +727,10 @@ const SILENT: &[&str] = &[
     "ORIVECT",
     "ORIWKS",
     // Only with tool radius compensation.
-    "CFC",
-    "CFIN",
-    "CFTCP",
     "CUT2D",
     "CUT2DF",
     "KONT",
     "NORM",
-    // Only with splines.
-    "BAUTO",
-    "BNAT",
-    "BTAN",
-    "EAUTO",
-    "ENAT",
-    "ETAN",
-    "SPATH",
-    "UPATH",
-    // No working-area limits are set.
-    "WALIMOF",
-    "WALIMON",
     // Display, single block, search: nothing to see in a simulation.
     "ACTBLOCNO",
     "DISPLOF",
