@@ -5,6 +5,7 @@
 
 use super::modal::Modal;
 use super::path_words::CornerWords;
+use super::setup::Setup;
 use super::variables::Variables;
 use super::wire::{Event, Feed, Move, MoveKind};
 use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
@@ -29,6 +30,9 @@ const KEPT_LINE_BYTES_MAX: usize = 512;
 #[derive(Clone, Debug)]
 pub struct Interpreter {
     pub(super) source: ProgramSource,
+    /// What lies around the program.
+    #[allow(dead_code)]
+    pub(super) setup: Arc<Setup>,
     pub(super) program: ProgramId,
     pub(super) machine: Arc<Machine>,
     pub(super) dialect: Arc<Dialect>,
@@ -73,7 +77,9 @@ enum State {
 
 impl Interpreter {
     /// At the first line; all axes at home.
-    pub fn new(source: ProgramSource, machine: &Machine) -> Self {
+    pub fn new(setup: impl Into<Setup>, machine: &Machine) -> Self {
+        let setup = setup.into();
+        let source = setup.program.clone();
         let mut position = PartPoint::default();
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
@@ -102,6 +108,7 @@ impl Interpreter {
             kept_blocks: BTreeMap::new(),
             furthest_line: 0,
             machine: Arc::new(machine.clone()),
+            setup: Arc::new(setup),
             source,
         }
     }
