@@ -221,14 +221,15 @@ fn axis_names() {
         ("M1", "M is a machine function"),
         ("R", "R parameter"),
         ("x", "write [axes.X]"),
-        ("XY", "capital letter"),
+        ("Xy", "capital letter"),
+        ("X_Y", "capital letter"),
         ("1", "capital letter"),
         ("\"Ä\"", "capital letter"),
         ("\"\"", "capital letter"),
     ] {
         assert_says(&only_error(&with(MINIMAL, "[axes.X]", &format!("[axes.{name}]"))), &[words]);
     }
-    for name in ["X", "Z2", "X1", "U", "C"] {
+    for name in ["X", "Z2", "X1", "U", "C", "XY", "ELX", "SP_1"] {
         assert!(parse(&with(MINIMAL, "[axes.X]", &format!("[axes.{name}]"))).is_ok(), "{name} is refused");
     }
 }
