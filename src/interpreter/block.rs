@@ -6,9 +6,10 @@
 use super::evaluate::{evaluate, integers, number};
 use super::modal::Motion;
 use super::motion::{AxisWord, MotionWords};
+use super::path_words::CornerWords;
 use super::run::Interpreter;
 use super::value::Value;
-use super::wire::{Event, MoveKind};
+use super::wire::{Event, Move, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
 use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure};
@@ -42,6 +43,8 @@ pub(super) struct Collected {
     pub spindle_speed_rpm: Option<(f64, Columns)>,
     pub frame: Option<(FrameWord, Columns)>,
     dwell: Option<Columns>,
+    /// RND, CHF, CHR, FRC.
+    pub corner: CornerWords,
     /// Output with the motion.
     pub events: Vec<Event>,
     /// T and M6: output before the motion where the block has an M6.
@@ -60,6 +63,7 @@ impl Interpreter {
         for word in words {
             self.word(word, &mut block)?;
         }
+        block.events.append(&mut self.trace_events);
         if let Some(columns) = block.dwell.take() {
             self.dwell(&mut block, &columns)?;
         } else {
@@ -70,7 +74,7 @@ impl Interpreter {
             self.act(&mut block)?;
         }
         if block.stops {
-            self.emit_function(Vec::new(), true);
+            self.emit(MoveKind::StopPreparation, self.standing_feed(), false, Vec::new());
         }
         if !block.last.is_empty() {
             self.emit_function(block.last, true);
@@ -87,8 +91,18 @@ impl Interpreter {
             let tool_events = std::mem::take(&mut block.tool_events);
             self.emit_function(tool_events, true);
         }
+        if !block.motion.any() && block.corner.has_shape() {
+            let columns = block.corner.columns();
+            return Err(Fault::new(codes::BAD_BLOCK, columns, "RND, CHF or CHR in a block without motion")
+                .label("expected the block that leads to the corner")
+                .help("RNDM= rounds all corners from here on"));
+        }
         if block.motion.any() {
             self.motion(&block.motion, &mut events)?;
+            if let Some(last) = self.queue.pop_back() {
+                let corner = self.corner_insert(&last.kind, &block.corner);
+                self.queue.push_back(Move { corner, ..last });
+            }
         }
         if !events.is_empty() {
             self.emit_function(events, false);
@@ -104,24 +118,24 @@ impl Interpreter {
             WordKind::Keyword(keyword) => self.keyword(*keyword, columns, block),
             WordKind::Message(text) => {
                 let text = match text {
-                    Some(text) => evaluate(text, &self.variables)?.text(),
+                    Some(text) => self.text_of(&evaluate(text, self)?, &text.columns)?,
                     None => "".into(),
                 };
                 block.events.push(Event::Message(text));
                 Ok(())
             }
             WordKind::Assign(target, value) => {
-                let result = evaluate(value, &self.variables)?;
+                let result = evaluate(value, self)?;
                 self.assign(target, &result, columns, &value.columns)
             }
             WordKind::Fill(target, filling) => match target {
                 Target::Variable { name, indices } => {
-                    let indices = integers(indices, &self.variables)?;
+                    let indices = integers(indices, self)?;
                     self.fill(name, &indices, filling, columns)
                 }
-                Target::Parameter(_) => {
+                Target::Parameter(_) | Target::System(_) => {
                     Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "SET and REP fill arrays")
-                        .label("an R parameter is none"))
+                        .label("this is none"))
                 }
             },
             WordKind::Indexed { address, index, values } => {
@@ -252,7 +266,7 @@ impl Interpreter {
             block.events.push(tool);
             return Ok(());
         }
-        let typed = Typed(number(&value.value, &self.variables)?);
+        let typed = Typed(number(&value.value, self)?);
         let has_form = matches!(
             address,
             Address::Axis(_)
@@ -336,7 +350,7 @@ impl Interpreter {
 
     /// Name of the tool, or its number as text.
     fn tool(&self, value: &AddressValue) -> Outcome<Arc<str>> {
-        Ok(match evaluate(&value.value, &self.variables)? {
+        Ok(match evaluate(&value.value, self)? {
             Value::Text(text) => text,
             number => whole(Typed(number.number(&value.value.columns)?), &value.value.columns, "T")?.to_string().into(),
         })

@@ -16,14 +16,17 @@ pub mod source;
 mod statements;
 pub mod structure;
 pub mod syntax;
+mod system_variables;
+mod visit;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
-pub use dialect::Dialect;
+pub use dialect::{Dialect, taken_axis_names};
 pub use parser::{parse, whole_number};
 pub use source::{Cursor, ProgramSource};
 pub use statements::{TEXT_MAX, block_number, visit_names};
 pub use syntax::Block;
+pub use system_variables::{SYSTEM_VARIABLES, SystemVariable};
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 
 use std::sync::Arc;
