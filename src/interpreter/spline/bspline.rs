@@ -58,6 +58,13 @@ impl BSpline {
         Self { linear, degree: degree.clamp(1, 3), points: VecDeque::from([first]), offset: 0, next: 1 }
     }
 
+    /// PW of the first control point.
+    pub fn weigh_start(&mut self, weight_ratio: f64) {
+        if let Some(first) = self.points.front_mut().filter(|_| self.offset == 0) {
+            first.weight_ratio = weight_ratio;
+        }
+    }
+
     /// The next control point.
     pub fn push(&mut self, point: ControlPoint) {
         self.points.push_back(point);
