@@ -28,7 +28,8 @@ struct Wanted<'a> {
 fn wanted(text: &str) -> Vec<Wanted<'_>> {
     let mut found = Vec::new();
     for (index, line) in text.lines().enumerate() {
-        let Some(start) = line.strip_prefix(';').and_then(|rest| rest.trim_start().starts_with('^').then(|| line.find('^')))
+        let Some(start) =
+            line.strip_prefix(';').and_then(|rest| rest.trim_start().starts_with('^').then(|| line.find('^')))
         else {
             continue;
         };

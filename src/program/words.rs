@@ -522,6 +522,11 @@ pub fn role(word: &str) -> Option<Role> {
     table.binary_search_by(|(known, _)| compare(known)).ok().map(|found| table[found].1)
 }
 
+/// A word with that role: the first in alphabetical order.
+pub fn spelling(wanted: Role) -> Option<&'static str> {
+    table().iter().find(|(_, role)| *role == wanted).map(|(word, _)| *word)
+}
+
 /// Every word of the table, in alphabetical order: for help texts.
 pub fn known_words() -> impl Iterator<Item = &'static str> + Clone {
     table().iter().map(|(word, _)| *word)
