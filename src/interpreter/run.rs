@@ -4,6 +4,7 @@
 //! in `motion`, jumps and loops in `flow`.
 
 use super::modal::Modal;
+use super::path_words::CornerWords;
 use super::setup::Setup;
 use super::variables::Variables;
 use super::wire::{Event, Feed, Move, MoveKind};
@@ -212,7 +213,11 @@ impl Interpreter {
         }
         let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
         let modes = self.modal.modes(exact_stop);
-        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, corner: None, events });
+        let corner = match self.modal.corner.radius_mm {
+            Some(_) => self.corner_insert(&kind, &CornerWords::default()),
+            None => None,
+        };
+        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, corner, events });
     }
 
     /// Hands a move without motion over.
