@@ -99,7 +99,19 @@ impl Grammar {
         if depth == 0 {
             return match self.below(6) {
                 0 => format!("R{}", self.below(100)),
-                1 => self.one_of(&["WIDTH", "level", "_A1", "TRUE", "FALSE", "\"TEXT\"", "\"\""]).to_owned(),
+                1 => self
+                    .one_of(&[
+                        "WIDTH",
+                        "level",
+                        "_A1",
+                        "TRUE",
+                        "FALSE",
+                        "\"TEXT\"",
+                        "\"\"",
+                        "$P_EP[X]",
+                        "CTRANS(X,1):CROT(Z,2)",
+                    ])
+                    .to_owned(),
                 _ => self.number(),
             };
         }

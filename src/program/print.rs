@@ -7,7 +7,7 @@
 use super::dialect::Dialect;
 use super::syntax::{
     Address, AddressValue, Block, Case, DefinedVariable, Definition, Destination, Expr, ExprKind, ForLoop, Form,
-    IndexedValue, Initial, Jump, Statement, Target, Unary, VariableType, Word, WordKind,
+    IndexedValue, Initial, Jump, Statement, SystemName, Target, Unary, VariableType, Word, WordKind,
 };
 use super::syntax::{Binary, BlockNumber, Direction};
 use super::words::{GFunction, IndexedAddress, Role, g_function, spelling};
@@ -114,7 +114,8 @@ impl Printer<'_> {
     }
 
     fn define(&mut self, definition: &Definition) {
-        self.word("DEF");
+        // NCK or CHAN: to a simulation with one channel they are the same.
+        self.word(if definition.global { "DEF NCK" } else { "DEF" });
         self.word(definition.variable_type.name());
         if let VariableType::Text(length) = definition.variable_type {
             self.put(format_args!("[{length}]"));
@@ -258,7 +259,7 @@ impl Printer<'_> {
     fn target(&mut self, target: &Target) {
         match target {
             Target::Parameter(index) => self.parameter(index),
-            Target::Variable { name, indices } => {
+            Target::Variable { name, indices } | Target::System(SystemName { name, indices }) => {
                 self.text.push_str(name);
                 self.indices(indices);
             }
@@ -296,7 +297,7 @@ impl Printer<'_> {
             }
             ExprKind::Text(text) => self.put(format_args!("\"{text}\"")),
             ExprKind::Parameter(index) => self.parameter(index),
-            ExprKind::Variable { name, indices } => {
+            ExprKind::Variable { name, indices } | ExprKind::System(SystemName { name, indices }) => {
                 self.text.push_str(name);
                 self.indices(indices);
             }
@@ -326,6 +327,7 @@ impl Printer<'_> {
         }
         self.operand(&operands.0, own);
         self.text.push_str(match operator {
+            Binary::Chain => ":",
             Binary::Multiply => "*",
             Binary::Divide => "/",
             Binary::IntegerDivide => " DIV ",
