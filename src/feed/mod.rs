@@ -4,8 +4,10 @@
 //! `look_ahead.blocks` motion blocks beyond the one that it fixes. Does not sample.
 
 mod blend_limits;
+mod group;
 mod junction;
 mod limits;
+mod modes;
 mod planner;
 pub mod profile;
 pub mod ramp;

@@ -11,6 +11,7 @@
 
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
+use super::modes::ModeRules;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw};
 use crate::base::Diagnostic;
@@ -18,11 +19,14 @@ use crate::kinematics::JointPath;
 use crate::machine::Machine;
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Plans speeds over a window of the path.
 #[derive(Clone, Debug)]
 pub struct Planner {
-    rules: AxisRules,
+    rules: ModeRules,
+    /// t_s.
+    setpoint_period_s: f64,
     look_ahead_blocks: u32,
     /// The window, then pieces that wait to enter it.
     entries: VecDeque<Entry>,
@@ -40,7 +44,7 @@ pub struct Planner {
     /// Speed at the start of the first piece.
     entry: SpeedCap,
     /// Ends of the last piece pushed that moves, unless the path rests after it.
-    last: Option<Ends>,
+    last: Option<(Ends, Arc<AxisRules>)>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
 }
@@ -90,7 +94,8 @@ impl Planner {
     /// An empty window on a path that begins at rest.
     pub fn new(machine: &Machine) -> Self {
         Self {
-            rules: AxisRules::new(machine),
+            rules: ModeRules::new(machine),
+            setpoint_period_s: machine.cycle.time_base.setpoint_period_s(),
             look_ahead_blocks: u32::try_from(machine.look_ahead_blocks).unwrap_or(u32::MAX),
             entries: VecDeque::new(),
             admitted: 0,
@@ -118,10 +123,14 @@ impl Planner {
                 let blend = matches!(contour.kind, PieceKind::Blend(..));
                 let (start, end) = (path.at(0.0), path.at(length_lu));
                 let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
-                corner = self.last.map_or(STOP, |before| junction::cap(&self.rules, &before, &ends));
-                let limits = self.rules.piece(contour, curve, &ends);
+                let rules = self.rules.of(&contour.modes);
+                corner = self
+                    .last
+                    .as_ref()
+                    .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
+                let limits = rules.piece(contour, curve, &ends);
                 check_motion(&limits, length_lu, &path)?;
-                self.last = Some(ends);
+                self.last = Some((ends, rules));
                 Motion::Moves { limits, length_lu, block_length_lu: (!blend).then_some(length_lu) }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
@@ -155,7 +164,7 @@ impl Planner {
         self.plan_backward();
         let ahead = if self.admitted > 1 { self.entries[1].entry.cap } else { self.end_of_window().cap };
         let front = self.entries.pop_front()?;
-        let (law, exit) = front.fixed(self.entry, ahead, self.rules.setpoint_period_s);
+        let (law, exit) = front.fixed(self.entry, ahead, self.setpoint_period_s);
         let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond };
         self.entry = exit;
         self.admitted -= 1;
@@ -261,7 +270,7 @@ impl Planner {
         if before.rests_after || piece.rests_before() {
             return REST;
         }
-        let t_s = self.rules.setpoint_period_s;
+        let t_s = self.setpoint_period_s;
         let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
         let inside = piece.motion.highest_entry(if piece.rests_after { REST } else { exit });
         if inside.cap.velocity_lu_s < junction.velocity_lu_s {
