@@ -9,6 +9,7 @@ mod junction;
 mod limits;
 mod modes;
 mod planner;
+mod positioning;
 pub mod profile;
 pub mod ramp;
 mod wire;
