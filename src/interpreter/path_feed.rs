@@ -56,14 +56,19 @@ impl Interpreter {
             } else {
                 ("expected F in this block or before it", "write F with mm/min, or G0 for a rapid")
             };
-            return Err(Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
-                .label(label)
-                .help(help));
+            return self.without_feed(
+                Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
+                    .label(label)
+                    .help(help),
+            );
         };
         let rotary = self.counts_angle(way);
         let pick = move |feed: ProgrammedFeed| if rotary { feed.rotary_rad_s } else { feed.linear_mm_s };
         let found = match self.modal.feed_modes.base {
-            FeedBase::Revolution => self.feed_of_revolution(way, words, pick(feed))?,
+            FeedBase::Revolution => match self.feed_of_revolution(way, words, pick(feed)) {
+                Ok(feed) => feed,
+                Err(fault) => return self.without_feed(fault),
+            },
             _ => self.shaped(feed, pick, words.block_feed.is_some()),
         };
         if self.modal.feed_modes.cutting
@@ -72,6 +77,17 @@ impl Interpreter {
             self.modal.spindle_speed_rpm = speed_rpm;
         }
         Ok(found)
+    }
+
+    /// Where moves are only listed, a feed that is missing is reported once, and the motion shown without one.
+    fn without_feed(&mut self, fault: Box<Fault>) -> Outcome<Feed> {
+        if !self.setup.lists_only {
+            return Err(fault);
+        }
+        if self.first_report(codes::NO_FEED) {
+            self.report(*fault);
+        }
+        Ok(Feed::Rapid)
     }
 
     /// Feed of the fast path: G94 with FNORM.

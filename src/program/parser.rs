@@ -403,7 +403,8 @@ impl<'a> WordParser<'_, 'a, '_> {
             }
             return Ok(WordKind::Address(Address::Axis(axis), self.address_value()?));
         }
-        match words::role(name) {
+        let is_call = next == Token::Symbol("(");
+        match words::role(name).filter(|role| is_call || !words::is_free_name(*role)) {
             Some(Role::Keyword(keyword)) => Ok(WordKind::Keyword(keyword)),
             Some(Role::Address(address)) => {
                 if !self.lexer.take("=") {
