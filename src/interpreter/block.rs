@@ -11,7 +11,7 @@ use super::value::Value;
 use super::wire::{Event, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
-use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure};
+use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure, Suppression};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 use std::sync::Arc;
 
@@ -188,14 +188,14 @@ impl Interpreter {
             GFunction::Dwell => block.dwell = Some(columns.clone()),
             GFunction::ExactStopOnce => block.motion.exact_stop = true,
             GFunction::Plane(plane) => self.modal.plane = plane,
-            GFunction::SuppressFrames(_) => block.motion.suppress_frames = true,
+            GFunction::SuppressFrames(which) => block.motion.suppress(which),
             GFunction::AxialOffset(coarse) => self.axial_offset(coarse, columns, block)?,
             GFunction::Pole(origin) => self.pole(origin, columns, block)?,
             GFunction::Limit(upper) => self.limit(upper, columns, block)?,
             GFunction::ExactStopWindow(window) => self.modal.exact_stop = window,
             GFunction::FeedType(feed_type) => self.feed_type(feed_type, columns)?,
-            // All zero offsets are 0.
-            GFunction::ZeroOffset(_) | GFunction::Silent(_) => {}
+            GFunction::ZeroOffset(number) => self.zero_offset(number),
+            GFunction::Silent(_) => {}
             GFunction::PathMode(mode) => self.modal.path_mode = mode,
             GFunction::Measure(measure) => self.modal.measure = measure,
             GFunction::Absolute(absolute) => self.modal.absolute = absolute,
@@ -220,7 +220,7 @@ impl Interpreter {
             Keyword::Compressor(compressor) => self.modal.compressor = compressor,
             Keyword::FeedforwardOn => self.modal.feedforward_active = true,
             Keyword::FeedforwardOff => self.modal.feedforward_active = false,
-            Keyword::SuppressFrames => block.motion.suppress_frames = true,
+            Keyword::SuppressFrames => block.motion.suppress(Suppression::All),
             Keyword::Frame(word) => block.frame = Some((word, columns.clone())),
             Keyword::StopPreparation => block.stops = true,
             Keyword::Return => block.ends = true,

@@ -15,6 +15,7 @@
 //! * Skip levels (`/`) are not active: these blocks are executed.
 //! * G601 is what is done; G602 and G603 are reported. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
+mod active_frames;
 mod arc;
 mod block;
 mod check;
@@ -22,11 +23,13 @@ mod curve_words;
 mod evaluate;
 mod feed_words;
 mod flow;
+mod frame;
 mod frame_words;
 mod listing;
 mod modal;
 mod motion;
 mod path_words;
+mod placement;
 mod run;
 mod value;
 mod variables;

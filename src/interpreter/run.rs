@@ -3,10 +3,12 @@
 //! In: a [`ProgramSource`] and the [`Machine`]. Out: [`Move`]s, warnings, at most one alarm. Words are executed in `block`, motion
 //! in `motion`, jumps and loops in `flow`.
 
+use super::frame::GeometryAxes;
 use super::modal::Modal;
+use super::placement::KnownPlace;
 use super::variables::Variables;
 use super::wire::{Event, Feed, Move, MoveKind};
-use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
+use crate::base::{AxisId, AxisKind, AxisVector, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
 use crate::program::syntax::{Direction, Statement};
@@ -32,7 +34,7 @@ pub struct Interpreter {
     pub(super) machine: Arc<Machine>,
     pub(super) dialect: Arc<Dialect>,
     /// X, Y and Z of the machine: the geometry axes.
-    pub(super) geometry: [Option<AxisId>; 3],
+    pub(super) geometry: GeometryAxes,
     /// The line in execution.
     pub(super) current: Cursor,
     /// The line after it, or where a jump leads.
@@ -42,8 +44,10 @@ pub struct Interpreter {
     pub(super) modal: Modal,
     /// All axes where the last move ended.
     pub(super) position: PartPoint,
-    /// Translation that each axis had when it last moved.
-    pub(super) applied_lu: crate::base::AxisVector,
+    /// Where each axis was sent last, in the workpiece system of then: incremental words count from here.
+    pub(super) programmed_lu: AxisVector,
+    /// `position` in the workpiece system.
+    pub(super) known_place: KnownPlace,
     pub(super) variables: Variables,
     /// Moves of the block in execution.
     pub(super) queue: VecDeque<Move>,
@@ -77,17 +81,21 @@ impl Interpreter {
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
         }
+        let linear = |id: &AxisId| machine.axis(*id).kind == AxisKind::Linear;
+        let geometry = ["X", "Y", "Z"].map(|name| machine.axis_by_name(name).filter(linear));
+        let modal = Modal::new(&machine.feed, geometry);
         let opened = OpenedProgram { id: ProgramId(0), name: source.file_name().into(), bytes: source.bytes().clone() };
         Self {
             program: ProgramId(0),
             dialect: Arc::new(Dialect::new(machine)),
-            geometry: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)),
+            geometry,
             current: source.first(),
             next: source.first(),
             number: 0,
-            modal: Modal::new(&machine.feed),
+            modal,
             position,
-            applied_lu: crate::base::AxisVector::zero(),
+            programmed_lu: position.0,
+            known_place: KnownPlace::new(modal.frames.clone(), position),
             variables: Variables::default(),
             queue: VecDeque::new(),
             found_numbers: BTreeMap::new(),
