@@ -4,6 +4,7 @@
 //! (assignments, G functions), then F, frame, T and M6, motion with the other outputs, and last M0, M1, M2, M17 or M30.
 
 use super::evaluate::{evaluate, integers, number};
+use super::frame_words::FrameRequest;
 use super::modal::Motion;
 use super::motion::{AxisWord, MotionWords};
 use super::run::Interpreter;
@@ -11,7 +12,7 @@ use super::value::Value;
 use super::wire::{Event, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
-use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure, Suppression};
+use crate::program::words::{GFunction, IndexedAddress, Keyword, Procedure, Suppression};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 use std::sync::Arc;
 
@@ -40,7 +41,7 @@ pub(super) struct Collected {
     addresses: Vec<Address>,
     pub feed: Option<(Typed, Columns)>,
     pub spindle_speed_rpm: Option<(f64, Columns)>,
-    pub frame: Option<(FrameWord, Columns)>,
+    pub frame: FrameRequest,
     dwell: Option<Columns>,
     /// Output with the motion.
     pub events: Vec<Event>,
@@ -63,10 +64,9 @@ impl Interpreter {
         if let Some(columns) = block.dwell.take() {
             self.dwell(&mut block, &columns)?;
         } else {
+            // Before S: with G25 and G26 it is a limit.
+            self.frame_request(&mut block)?;
             self.take_feed(&mut block)?;
-            if let Some((frame, columns)) = block.frame.take() {
-                self.frame(frame, &mut block, &columns)?;
-            }
             self.act(&mut block)?;
         }
         if block.stops {
@@ -221,7 +221,7 @@ impl Interpreter {
             Keyword::FeedforwardOn => self.modal.feedforward_active = true,
             Keyword::FeedforwardOff => self.modal.feedforward_active = false,
             Keyword::SuppressFrames => block.motion.suppress(Suppression::All),
-            Keyword::Frame(word) => block.frame = Some((word, columns.clone())),
+            Keyword::Frame(word) => return self.frame_word(word, columns, block),
             Keyword::StopPreparation => block.stops = true,
             Keyword::Return => block.ends = true,
         }
@@ -362,14 +362,14 @@ impl Interpreter {
             self.modal.feed = Some(self.modal.programmed_feed(typed));
         }
         if let Some((speed_rpm, _)) = block.spindle_speed_rpm {
-            self.modal.spindle_speed_rpm = speed_rpm;
+            self.modal.spindle_speed_rpm = self.modal.limited_speed_rpm(speed_rpm);
         }
         Ok(())
     }
 
     /// G4 F (seconds) or G4 S (revolutions): F and S of the path stay as they are.
     fn dwell(&mut self, block: &mut Collected, columns: &Columns) -> Outcome<()> {
-        if block.motion.any() || block.frame.is_some() {
+        if block.motion.any() || block.frame.any() {
             return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "G4 with a motion or a frame in one block")
                 .label("expected a block of its own"));
         }
@@ -402,6 +402,14 @@ impl Interpreter {
             (Some(_), Some((_, columns))) => Err(missing(&columns, "G4 with both F and S")),
             (None, None) => Err(missing(columns, "G4 without a time")),
         }
+    }
+}
+
+impl Collected {
+    /// Takes the S word out of the block: it limits the spindle and is no speed.
+    pub fn take_spindle_speed(&mut self) -> Option<(f64, Columns)> {
+        self.events.retain(|event| !matches!(event, Event::SpindleSpeed { .. }));
+        self.spindle_speed_rpm.take()
     }
 }
 

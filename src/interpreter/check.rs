@@ -5,6 +5,7 @@
 
 use super::flow::unbalanced;
 use super::run::Interpreter;
+use super::setup::Setup;
 use super::variables::undeclared;
 use crate::base::diagnostics::nearest;
 use crate::base::{Diagnostic, Severity};
@@ -18,13 +19,15 @@ use std::sync::Arc;
 const MOVES_MAX: u64 = 20_000_000;
 
 /// All diagnostics of `source` on `machine`.
-pub fn check(source: &ProgramSource, machine: &Machine) -> Vec<Diagnostic> {
+pub fn check(setup: impl Into<Setup>, machine: &Machine) -> Vec<Diagnostic> {
+    let setup = setup.into();
+    let source = &setup.program;
     let mut found = every_line(source, &Dialect::new(machine));
     let is_sound = found.is_empty();
     if is_sound {
         found = names_and_partners(source, &Dialect::new(machine));
     }
-    run(source, machine, is_sound, &mut found);
+    run(&setup, machine, is_sound, &mut found);
     found.sort_by_key(|diagnostic| (diagnostic.line(), columns_of(diagnostic)));
     let mut seen = BTreeSet::new();
     found.retain(|diagnostic| {
@@ -163,8 +166,8 @@ fn visit_jump(jump: &Jump, visit: &mut impl FnMut(&Arc<str>, &Columns)) {
 }
 
 /// Executes the program for what only shows then.
-fn run(source: &ProgramSource, machine: &Machine, is_sound: bool, found: &mut Vec<Diagnostic>) {
-    let mut interpreter = Interpreter::new(source.clone(), machine);
+fn run(setup: &Setup, machine: &Machine, is_sound: bool, found: &mut Vec<Diagnostic>) {
+    let mut interpreter = Interpreter::new(setup.clone(), machine);
     for _ in 0..MOVES_MAX {
         match interpreter.next_move() {
             Ok(Some(_)) => {}

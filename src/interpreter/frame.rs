@@ -283,7 +283,9 @@ impl Frame {
             let share = dot(a, along);
             [a[0] - share * along[0], a[1] - share * along[1], a[2] - share * along[2]]
         };
-        let (Some(mut first), Some(second)) = (unit(x), unit(x).and_then(|first| unit(without(y, first)))) else { return };
+        let (Some(mut first), Some(second)) = (unit(x), unit(x).and_then(|first| unit(without(y, first)))) else {
+            return;
+        };
         let mut third = cross(first, second);
         let scales_ratio = [dot(x, first), dot(y, second), dot(z, third)];
         let is_left_handed = scales_ratio[2] < 0.0;

@@ -15,7 +15,6 @@ use super::frame::{Component, Frame};
 use super::motion::MotionWords;
 use super::run::Interpreter;
 use crate::base::units::rad_from_deg;
-use crate::base::{AxisId, AxisKind};
 use crate::program::syntax::{Form, Typed};
 use crate::program::words::{FrameWord, Plane};
 use crate::program::{Columns, Fault, Outcome, codes};
@@ -81,17 +80,19 @@ impl Interpreter {
             return match request.plane_rotation {
                 None => Ok(()),
                 Some((_, columns)) => {
-                    Err(Fault::new(codes::BAD_FRAME, columns, "RPL without ROT or AROT").label("expected ROT before it"))
+                    Err(Fault::new(codes::BAD_FRAME, columns, "RPL without ROT or AROT")
+                        .label("expected ROT before it"))
                 }
             };
         }
         let words = std::mem::take(&mut block.motion);
-        let asked = [&request.word.as_ref().map(|(_, columns)| columns), &request.axial_offset.as_ref().map(|(_, c)| c)];
-        let limit = request.limit.as_ref().map(|(_, columns)| columns);
-        let mut columns = asked.into_iter().flatten().chain(limit);
-        let first = columns.next().cloned().unwrap_or(0..0);
-        if let Some(second) = columns.next() {
-            return Err(second_frame(second));
+        let word = request.word.as_ref().map(|(_, columns)| columns.clone());
+        let offset = request.axial_offset.as_ref().map(|(_, columns)| columns.clone());
+        let limit = request.limit.as_ref().map(|(_, columns)| columns.clone());
+        let mut asked = [word, offset, limit].into_iter().flatten();
+        let first = asked.next().unwrap_or(0..0);
+        if let Some(second) = asked.next() {
+            return Err(second_frame(&second));
         }
         if words.has_circle_words() {
             return Err(Fault::new(codes::BAD_BLOCK, first, "a frame and a circle in one block")
@@ -127,8 +128,9 @@ impl Interpreter {
     ) -> Outcome<()> {
         let is_rotation = matches!(word, FrameWord::Rot | FrameWord::AddRot);
         if let Some((_, columns)) = plane_rotation.as_ref().filter(|_| !is_rotation) {
-            return Err(Fault::new(codes::BAD_FRAME, columns.clone(), "RPL without ROT or AROT")
-                .label("only for ROT and AROT"));
+            return Err(
+                Fault::new(codes::BAD_FRAME, columns.clone(), "RPL without ROT or AROT").label("only for ROT and AROT")
+            );
         }
         let new = match word {
             FrameWord::Trans | FrameWord::AddTrans => self.translation(words),
@@ -249,11 +251,6 @@ impl Interpreter {
     /// The frames in force, to change.
     pub(super) fn frames_mut(&mut self) -> &mut ActiveFrames {
         Arc::make_mut(&mut self.modal.frames)
-    }
-
-    /// Kind of an axis, for its unit.
-    pub(super) fn kind_of(&self, id: AxisId) -> AxisKind {
-        self.machine.axis(id).kind
     }
 }
 

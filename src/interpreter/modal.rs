@@ -3,11 +3,10 @@
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
 use super::active_frames::ActiveFrames;
-use super::frame::GeometryAxes;
 use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
+use crate::base::AxisKind;
 use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
-use crate::base::AxisKind;
 use crate::machine::{AccelerationMode, DynamicsMode, FeedSettings, PathMode};
 use crate::program::syntax::Typed;
 use crate::program::words::{Measure, Plane};
@@ -72,13 +71,15 @@ pub struct Modal {
     pub feed: Option<ProgrammedFeed>,
     /// S; 0 before the first.
     pub spindle_speed_rpm: f64,
+    /// G25 S, G26 S: lowest and highest spindle speed.
+    pub spindle_range_rpm: [f64; 2],
     /// Basic, settable and programmable frame.
     pub frames: Arc<ActiveFrames>,
 }
 
 impl Modal {
     /// State at program start: G1 G17 G90 G94 G71, and what the machine file says.
-    pub fn new(settings: &FeedSettings, geometry: GeometryAxes) -> Self {
+    pub fn new(settings: &FeedSettings, frames: ActiveFrames) -> Self {
         Self {
             motion: Motion::Line,
             plane: Plane::G17,
@@ -97,8 +98,20 @@ impl Modal {
             feedforward_active: true,
             feed: None,
             spindle_speed_rpm: 0.0,
-            frames: Arc::new(ActiveFrames::new(geometry)),
+            frames: Arc::new(frames),
+            spindle_range_rpm: [0.0, f64::INFINITY],
         }
+    }
+
+    /// G25 S (lower), G26 S (upper).
+    pub fn limit_spindle(&mut self, upper: bool, speed_rpm: f64) {
+        self.spindle_range_rpm[usize::from(upper)] = speed_rpm;
+    }
+
+    /// S as far as G25 and G26 allow it.
+    pub fn limited_speed_rpm(&self, speed_rpm: f64) -> f64 {
+        // Not clamp: a program may set the limits the wrong way round.
+        speed_rpm.max(self.spindle_range_rpm[0]).min(self.spindle_range_rpm[1])
     }
 
     /// Modes for the wire; `exact_stop` = G9 in this block.

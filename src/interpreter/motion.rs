@@ -9,7 +9,7 @@ use super::modal::Motion;
 use super::placement::turn_outward;
 use super::run::Interpreter;
 use super::value::trimmed;
-use super::wire::{ArcGeometry, Event, Feed, MoveKind};
+use super::wire::{Event, Feed, MoveKind};
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, AxisVector, PartPoint, PerAxis};
 use crate::machine::Machine;
@@ -83,7 +83,7 @@ impl MotionWords {
     }
 
     /// Columns of all words of the motion.
-    fn columns(&self) -> Columns {
+    pub fn columns(&self) -> Columns {
         let axes =
             self.axes.as_slice().iter().flatten().chain(self.centre.iter().flatten()).map(|word| word.columns.clone());
         let all = axes.chain(self.radius.iter().map(|(_, columns)| columns.clone()));
@@ -119,6 +119,7 @@ impl Interpreter {
             Motion::Line => MoveKind::Line,
             Motion::Clockwise | Motion::CounterClockwise => self.arc(words)?,
         };
+        self.check_work_area(words, &kind, &end)?;
         self.check_travel(words, end);
         self.arrive(words, end);
         let feed = self.feed_of(start, end, circle);
@@ -181,7 +182,12 @@ impl Interpreter {
                 programmed_lu[id] = work_lu[id];
             }
         }
-        let fits = |id: AxisId| self.beyond_travel(id, &end).is_none() && end.0[id].abs() <= LENGTH_MAX_LU;
+        let fits = |id: AxisId| {
+            let end_lu = end.0[id];
+            self.beyond_travel(id, &end).is_none()
+                && end_lu.abs() <= LENGTH_MAX_LU
+                && self.work_area.violated_lu(id, end_lu).is_none()
+        };
         let moved = |id: &AxisId| block.axes[*id].is_some() || end.0[*id] != self.position.0[*id];
         machine.axis_ids().filter(moved).all(fits).then_some((end, PlainWork { programmed_lu, turned_lu }))
     }
@@ -240,9 +246,7 @@ impl Interpreter {
             },
             None if has_centre => {
                 let centre = |k: usize| match in_plane[k] {
-                    Some(word) => {
-                        bounded(self.centre_mm(word, start_mm[k]), &word.columns)
-                    }
+                    Some(word) => bounded(self.centre_mm(word, start_mm[k]), &word.columns),
                     None => Ok(start_mm[k]),
                 };
                 ArcShape::Centre { centre_mm: [centre(0)?, centre(1)?] }
@@ -308,7 +312,11 @@ impl Interpreter {
                 AxisKind::Rotary => (deg_from_rad, "deg"),
             };
             let name = &axis.name;
-            let (end, limit, beyond) = (trimmed(shown(self.machine_position_lu(id, &end))), trimmed(shown(limit_lu)), trimmed(shown(beyond_lu)));
+            let (end, limit, beyond) = (
+                trimmed(shown(self.machine_position_lu(id, &end))),
+                trimmed(shown(limit_lu)),
+                trimmed(shown(beyond_lu)),
+            );
             let message =
                 format!("{name} goes to {end} {unit}, {beyond} {unit} beyond its travel limit of {limit} {unit}");
             let fault = Fault::new(codes::TRAVEL, columns, message)

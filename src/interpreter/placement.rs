@@ -34,9 +34,14 @@ pub(super) struct KnownPlace {
 }
 
 impl KnownPlace {
-    /// Without frames.
+    /// Calculates it.
     pub fn new(frames: Arc<ActiveFrames>, position: PartPoint) -> Self {
-        Self { work_lu: position.0, frames, position }
+        Self { work_lu: frames.total().frame.inward(&position.0), frames, position }
+    }
+
+    /// The position in the workpiece system.
+    pub fn work_lu(&self) -> AxisVector {
+        self.work_lu
     }
 }
 
@@ -84,12 +89,7 @@ impl Interpreter {
     }
 
     /// Where a word sends its axis, in the workpiece system of the block.
-    pub(super) fn axis_target_lu(
-        &self,
-        id: AxisId,
-        word: &AxisWord,
-        suppression: Option<Suppression>,
-    ) -> Outcome<f64> {
+    pub(super) fn axis_target_lu(&self, id: AxisId, word: &AxisWord, suppression: Option<Suppression>) -> Outcome<f64> {
         let axis = self.machine.axis(id);
         let value_lu = self.modal.position_lu(axis.kind, word.typed);
         let incremental = match word.form {
@@ -123,9 +123,8 @@ impl Interpreter {
         let turns = self.machine.axis_ids().any(|id| words.axes[id].is_some() && total.turning_place(id).is_some());
         for id in self.machine.axis_ids() {
             let together = turns && total.frame.place(id).is_some();
-            let incremental = |word: &AxisWord| {
-                word.form == Form::Incremental || (word.form == Form::Modal && !self.modal.absolute)
-            };
+            let incremental =
+                |word: &AxisWord| word.form == Form::Incremental || (word.form == Form::Modal && !self.modal.absolute);
             match &words.axes[id] {
                 // What has not been made good before stays pending.
                 Some(word) if words.suppression.is_some() && incremental(word) => {
@@ -206,8 +205,7 @@ pub(super) fn turn_outward(
     for (row, id) in axes.iter().enumerate() {
         let Some(id) = id else { continue };
         let cells = total.frame.matrix()[row];
-        let depends =
-            axes.iter().zip(cells).any(|(other, cell)| cell != 0.0 && other.is_some_and(&is_programmed));
+        let depends = axes.iter().zip(cells).any(|(other, cell)| cell != 0.0 && other.is_some_and(&is_programmed));
         if depends {
             end.0[*id] = total.row_outward(row, work_lu);
         }
@@ -217,7 +215,8 @@ pub(super) fn turn_outward(
 /// Length of both images of the unit vectors of a plane; a circle stays one only where they are equal and at right angles.
 fn equal_scale(directions: &[AxisVector; 2], columns: &Columns) -> Outcome<f64> {
     let [first, second] = directions.map(|direction| direction.norm());
-    if (first - second).abs() <= SAME_RATIO * first && directions[0].dot(&directions[1]).abs() <= SAME_RATIO * first * second
+    if (first - second).abs() <= SAME_RATIO * first
+        && directions[0].dot(&directions[1]).abs() <= SAME_RATIO * first * second
     {
         return Ok(first);
     }

@@ -3,11 +3,15 @@
 //! In: a [`ProgramSource`] and the [`Machine`]. Out: [`Move`]s, warnings, at most one alarm. Words are executed in `block`, motion
 //! in `motion`, jumps and loops in `flow`.
 
+use super::active_frames::ActiveFrames;
 use super::frame::GeometryAxes;
 use super::modal::Modal;
 use super::placement::KnownPlace;
+use super::setup::Setup;
 use super::variables::Variables;
 use super::wire::{Event, Feed, Move, MoveKind};
+use super::work_area::WorkArea;
+use super::zero_offsets::ZeroOffsets;
 use crate::base::{AxisId, AxisKind, AxisVector, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
@@ -30,6 +34,9 @@ const KEPT_LINE_BYTES_MAX: usize = 512;
 #[derive(Clone, Debug)]
 pub struct Interpreter {
     pub(super) source: ProgramSource,
+    /// What lies around the program.
+    #[allow(dead_code)]
+    pub(super) setup: Arc<Setup>,
     pub(super) program: ProgramId,
     pub(super) machine: Arc<Machine>,
     pub(super) dialect: Arc<Dialect>,
@@ -42,6 +49,9 @@ pub struct Interpreter {
     /// Running number of the block.
     pub(super) number: u64,
     pub(super) modal: Modal,
+    /// $P_UIFR and $P_UBFR.
+    pub(super) zero_offsets: Arc<ZeroOffsets>,
+    pub(super) work_area: WorkArea,
     /// All axes where the last move ended.
     pub(super) position: PartPoint,
     /// Where each axis was sent last, in the workpiece system of then: incremental words count from here.
@@ -76,14 +86,18 @@ enum State {
 
 impl Interpreter {
     /// At the first line; all axes at home.
-    pub fn new(source: ProgramSource, machine: &Machine) -> Self {
+    pub fn new(setup: impl Into<Setup>, machine: &Machine) -> Self {
+        let setup = setup.into();
+        let source = setup.program.clone();
         let mut position = PartPoint::default();
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
         }
         let linear = |id: &AxisId| machine.axis(*id).kind == AxisKind::Linear;
         let geometry = ["X", "Y", "Z"].map(|name| machine.axis_by_name(name).filter(linear));
-        let modal = Modal::new(&machine.feed, geometry);
+        let zero_offsets = setup.zero_offsets.clone();
+        let modal = Modal::new(&machine.feed, initial_frames(&zero_offsets, geometry));
+        let known_place = KnownPlace::new(modal.frames.clone(), position);
         let opened = OpenedProgram { id: ProgramId(0), name: source.file_name().into(), bytes: source.bytes().clone() };
         Self {
             program: ProgramId(0),
@@ -93,9 +107,11 @@ impl Interpreter {
             next: source.first(),
             number: 0,
             modal,
+            zero_offsets,
+            work_area: WorkArea::default(),
             position,
-            programmed_lu: position.0,
-            known_place: KnownPlace::new(modal.frames.clone(), position),
+            programmed_lu: known_place.work_lu(),
+            known_place,
             variables: Variables::default(),
             queue: VecDeque::new(),
             found_numbers: BTreeMap::new(),
@@ -109,6 +125,7 @@ impl Interpreter {
             kept_blocks: BTreeMap::new(),
             furthest_line: 0,
             machine: Arc::new(machine.clone()),
+            setup: Arc::new(setup),
             source,
         }
     }
@@ -258,4 +275,12 @@ impl Interpreter {
             .label("executed again and again")
             .help("check the condition of the loop or jump")
     }
+}
+
+/// G500 and the basic frame.
+fn initial_frames(offsets: &ZeroOffsets, axes: GeometryAxes) -> ActiveFrames {
+    let mut frames = ActiveFrames::new(axes);
+    frames.set_basic(offsets.basic(axes));
+    frames.set_settable(0, offsets.settable(0, axes));
+    frames
 }
