@@ -7,7 +7,7 @@ use super::output::show;
 use crate::base::Diagnostic;
 use crate::interpreter::Setup;
 use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, load, unsupported};
-use crate::program::ProgramSource;
+use crate::program::{ProgramSource, taken_axis_names};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +34,9 @@ impl MachineChoice {
                 DEFAULT_MACHINE
             }
         };
-        load(name, &self.sets).map_err(refused)
+        let loaded = load(name, &self.sets).map_err(refused)?;
+        let taken = taken_axis_names(&loaded.machine);
+        if taken.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(taken)) }
     }
 
     /// The machine file, if it is one that can be overwritten.

@@ -3,6 +3,7 @@
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
 use super::active_frames::ActiveFrames;
+use super::path_words::ModalCorner;
 use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
 use crate::base::AxisKind;
 use crate::base::units::S_PER_MIN;
@@ -53,6 +54,8 @@ pub struct Modal {
     pub rounding_distance_mm: Option<f64>,
     /// ADISPOS.
     pub rapid_rounding_distance_mm: Option<f64>,
+    /// RNDM and FRCM.
+    pub corner: ModalCorner,
     /// G601, G602, G603.
     pub exact_stop: ExactStop,
     /// COMPOF, COMPON and so on.
@@ -89,6 +92,7 @@ impl Modal {
             contour_tolerance_mm: None,
             rounding_distance_mm: None,
             rapid_rounding_distance_mm: None,
+            corner: ModalCorner::default(),
             exact_stop: ExactStop::Fine,
             compressor: Compressor::Off,
             acceleration_mode: settings.default_acceleration_mode,

@@ -6,6 +6,7 @@
 use super::active_frames::ActiveFrames;
 use super::frame::GeometryAxes;
 use super::modal::Modal;
+use super::path_words::CornerWords;
 use super::placement::KnownPlace;
 use super::setup::Setup;
 use super::variables::Variables;
@@ -230,7 +231,11 @@ impl Interpreter {
         }
         let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
         let modes = self.modal.modes(exact_stop);
-        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, corner: None, events });
+        let corner = match self.modal.corner.radius_mm {
+            Some(_) => self.corner_insert(&kind, &CornerWords::default()),
+            None => None,
+        };
+        self.queue.push_back(Move { block, kind, end: self.position, feed, modes, corner, events });
     }
 
     /// Hands a move without motion over.

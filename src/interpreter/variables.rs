@@ -107,6 +107,11 @@ impl Variables {
         Ok(())
     }
 
+    /// True if DEF has made it.
+    pub fn is_declared(&self, name: &str) -> bool {
+        self.declared.contains_key(name)
+    }
+
     /// Value of a variable or array element.
     pub fn get(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<Value> {
         let variable = self.declared(name, columns)?;

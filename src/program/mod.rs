@@ -19,7 +19,7 @@ pub mod syntax;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
-pub use dialect::Dialect;
+pub use dialect::{Dialect, taken_axis_names};
 pub use parser::{parse, whole_number};
 pub use source::{Cursor, ProgramSource};
 pub use statements::{TEXT_MAX, block_number, visit_names};
