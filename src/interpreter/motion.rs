@@ -194,11 +194,11 @@ impl Interpreter {
 
     /// The limit that an axis violates at `end`, and by how much.
     fn beyond_travel(&self, id: AxisId, end: &PartPoint) -> Option<(f64, f64)> {
-        outside(self.machine.axis(id).travel_lu, self.machine_position_lu(id, end))
+        outside(self.machine.axis(id).travel_lu, self.machine_end_lu(id, end))
     }
 
     /// Position of a machine axis when the tool tip is at `end`.
-    fn machine_position_lu(&self, id: AxisId, end: &PartPoint) -> f64 {
+    fn machine_end_lu(&self, id: AxisId, end: &PartPoint) -> f64 {
         end.0[id] + self.modal.tool.as_ref().map_or(0.0, |tool| tool.length[id])
     }
 
@@ -312,11 +312,8 @@ impl Interpreter {
                 AxisKind::Rotary => (deg_from_rad, "deg"),
             };
             let name = &axis.name;
-            let (end, limit, beyond) = (
-                trimmed(shown(self.machine_position_lu(id, &end))),
-                trimmed(shown(limit_lu)),
-                trimmed(shown(beyond_lu)),
-            );
+            let (end, limit, beyond) =
+                (trimmed(shown(self.machine_end_lu(id, &end))), trimmed(shown(limit_lu)), trimmed(shown(beyond_lu)));
             let message =
                 format!("{name} goes to {end} {unit}, {beyond} {unit} beyond its travel limit of {limit} {unit}");
             let fault = Fault::new(codes::TRAVEL, columns, message)
