@@ -22,10 +22,6 @@ const TOOL_CHANGE: u32 = 6;
 /// M0, M1: stop. M2, M17, M30: end. They come after the motion of their block.
 const STOPS: [u32; 5] = [0, 1, 2, 17, 30];
 const ENDS: [u32; 3] = [2, 17, 30];
-/// T0: no tool.
-const NO_TOOL: &str = "0";
-/// D0: no length and no radius, whatever the tool.
-const NO_EDGE: u32 = 0;
 /// Most circles that TURN adds.
 const TURNS_MAX: u32 = 999;
 /// Smallest F of the control, in the unit of F.
@@ -49,8 +45,12 @@ pub(super) struct Collected {
     /// Output with the motion.
     pub events: Vec<Event>,
     /// T and M6: output before the motion where the block has an M6.
-    tool_events: Vec<Event>,
-    tool_change: bool,
+    pub tool_events: Vec<Event>,
+    pub tool_change: bool,
+    /// T changes the tool without M6.
+    pub tool_loads: bool,
+    /// D.
+    pub edge: Option<(u32, Columns)>,
     /// M0, M1, M2, M17, M30.
     last: Vec<Event>,
     ends: bool,
@@ -87,10 +87,7 @@ impl Interpreter {
 
     fn act(&mut self, block: &mut Collected) -> Outcome<()> {
         let mut events = std::mem::take(&mut block.events);
-        if block.tool_change {
-            let tool_events = std::mem::take(&mut block.tool_events);
-            self.emit_function(tool_events, true);
-        }
+        self.tool_words(block, &mut events)?;
         if !block.motion.any() && block.corner.has_shape() {
             let columns = block.corner.columns();
             return Err(Fault::new(codes::BAD_BLOCK, columns, "RND, CHF or CHR in a block without motion")
@@ -258,9 +255,7 @@ impl Interpreter {
         }
         if address == Address::Tool {
             let name = self.tool(value)?;
-            if &*name != NO_TOOL {
-                self.report_tool("tool", &name, columns);
-            }
+            block.tool_loads |= self.select_tool(&name, columns)?;
             let tool = Event::Tool(name);
             block.tool_events.push(tool.clone());
             block.events.push(tool);
@@ -298,9 +293,7 @@ impl Interpreter {
             }
             Address::Edge => {
                 let edge = whole(typed, columns, "D")?;
-                if edge != NO_EDGE {
-                    self.report_tool("edge", &format!("D{edge}"), columns);
-                }
+                block.edge = Some((edge, columns.clone()));
                 block.events.push(Event::Edge(edge));
             }
             Address::M => m_function(whole(typed, columns, "M")?, block),
@@ -356,17 +349,6 @@ impl Interpreter {
         })
     }
 
-    /// There is no tool table: reports the first tool or edge that is selected, once a run.
-    fn report_tool(&mut self, what: &str, name: &str, columns: &Columns) {
-        if self.first_report(codes::NO_TOOL_DATA) {
-            let message = format!("{what} `{name}` has no data: length and radius of every tool count as 0");
-            let fault = Fault::new(codes::NO_TOOL_DATA, columns.clone(), message)
-                .label("no data")
-                .help("positions are those of a tool tip without length; further tools are not reported");
-            self.warn(*fault);
-        }
-    }
-
     fn take_feed(&mut self, block: &mut Collected) -> Outcome<()> {
         if let Some((typed, columns)) = block.feed.take() {
             if typed.0 < FEED_MIN {
@@ -393,6 +375,7 @@ impl Interpreter {
                 .label(format!("expected 0 to {DWELL_MAX_S} s")));
         }
         let mut events = std::mem::take(&mut block.events);
+        self.change_and_apply(block)?;
         if block.tool_change {
             events.splice(0..0, block.tool_events.drain(..));
         }

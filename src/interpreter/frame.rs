@@ -19,6 +19,7 @@
 //! direction of X.
 
 use crate::base::{AxisId, AxisVector, PerAxis};
+use crate::machine::ZeroOffset;
 use std::f64::consts::FRAC_PI_2;
 
 /// X, Y, Z where the machine has them as linear axes.
@@ -79,6 +80,20 @@ impl Frame {
             mirror: PerAxis::splat(false),
             matrix: UNIT,
         }
+    }
+
+    /// A zero offset of a file.
+    pub fn from_offset(axes: GeometryAxes, offset: &ZeroOffset) -> Self {
+        let mut frame = Self {
+            translation_lu: offset.translation_lu,
+            fine_lu: offset.fine_lu,
+            rotation_rad: axes.map(|axis| axis.map_or(0.0, |axis| offset.rotation_rad[axis])),
+            scale_ratio: offset.scale_ratio,
+            mirror: offset.mirror,
+            ..Self::identity(axes)
+        };
+        frame.rebuild();
+        frame
     }
 
     /// Rotation by angles about X, Y, Z in RPY order.

@@ -69,6 +69,10 @@ impl Interpreter {
 
     /// G54 and its kin: the settable frame as the data management has it now.
     pub(super) fn zero_offset(&mut self, number: u16) {
+        if std::mem::take(&mut self.basic_is_pending) {
+            let basic = self.zero_offsets.basic(self.geometry);
+            self.frames_mut().set_basic(basic);
+        }
         let settable = self.zero_offsets.settable(number, self.geometry);
         self.frames_mut().set_settable(number, settable);
     }
@@ -217,7 +221,7 @@ impl Interpreter {
     }
 
     /// A frame turns two axes about the third: both must be there.
-    fn check_turnable(&self, about: usize, columns: &Columns) -> Outcome<()> {
+    pub(super) fn check_turnable(&self, about: usize, columns: &Columns) -> Outcome<()> {
         let missing = (0..3).find(|place| *place != about && self.geometry[*place].is_none());
         match missing {
             None => Ok(()),

@@ -38,6 +38,7 @@ mod setup;
 mod strings;
 mod system_values;
 mod tool_variables;
+mod tool_words;
 mod value;
 mod variables;
 mod wire;

@@ -178,9 +178,6 @@ impl Interpreter {
         }
         if let Some(work_lu) = &turned_lu {
             turn_outward(total, work_lu, |id| block.axes[id].is_some(), &mut end);
-            for id in self.geometry.into_iter().flatten() {
-                programmed_lu[id] = work_lu[id];
-            }
         }
         let fits = |id: AxisId| {
             let end_lu = end.0[id];

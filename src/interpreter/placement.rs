@@ -8,8 +8,8 @@
 //!   stand.
 //! * An axis without a word in a block keeps its position in the basic system, unless the frames turn it together with an axis that
 //!   has one: then it keeps its position in the workpiece system.
-//! * An incremental word counts from the position that was programmed last, so that it also makes good the change of the frames
-//!   (SD42440 = 1, the control's default). Where frames turn, a word of X, Y or Z makes it good for all three.
+//! * An incremental word counts from the position that was programmed last for its axis, in the workpiece system of then, so that it
+//!   also makes good the change of the frames (SD42440 = 1, the control's default).
 //! * In a block with G53, G153 or SUPA an incremental word counts from where the axis stands.
 
 use super::active_frames::{ActiveFrames, Total};
@@ -119,10 +119,7 @@ impl Interpreter {
         let start_lu = self.work_position_lu(None);
         self.position = end;
         let work_lu = self.work_position_lu(None);
-        let total = self.modal.frames.total();
-        let turns = self.machine.axis_ids().any(|id| words.axes[id].is_some() && total.turning_place(id).is_some());
         for id in self.machine.axis_ids() {
-            let together = turns && total.frame.place(id).is_some();
             let incremental =
                 |word: &AxisWord| word.form == Form::Incremental || (word.form == Form::Modal && !self.modal.absolute);
             match &words.axes[id] {
@@ -131,7 +128,6 @@ impl Interpreter {
                     self.programmed_lu[id] += work_lu[id] - start_lu[id];
                 }
                 Some(_) => self.programmed_lu[id] = work_lu[id],
-                None if together => self.programmed_lu[id] = work_lu[id],
                 None => {}
             }
         }

@@ -8,13 +8,14 @@ use super::frame::GeometryAxes;
 use super::modal::Modal;
 use super::path_words::CornerWords;
 use super::placement::KnownPlace;
-use super::setup::Setup;
+use super::setup::{Setup, geometry_axes};
 use super::system_values::ChannelMemory;
+use super::tool_words::ToolState;
 use super::variables::Variables;
 use super::wire::{Event, Feed, MainRun, Move, MoveKind};
 use super::work_area::WorkArea;
 use super::zero_offsets::ZeroOffsets;
-use crate::base::{AxisId, AxisKind, AxisVector, Diagnostic, PartPoint, PerAxis};
+use crate::base::{AxisVector, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
 use crate::program::syntax::{Direction, Statement};
@@ -52,7 +53,10 @@ pub struct Interpreter {
     pub(super) modal: Modal,
     /// $P_UIFR and $P_UBFR.
     pub(super) zero_offsets: Arc<ZeroOffsets>,
+    /// $P_UBFR was written since the last G500 or G54.
+    pub(super) basic_is_pending: bool,
     pub(super) work_area: WorkArea,
+    pub(super) tools: ToolState,
     /// All axes where the last move ended.
     pub(super) position: PartPoint,
     /// Where each axis was sent last, in the workpiece system of then: incremental words count from here.
@@ -106,8 +110,7 @@ impl Interpreter {
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
         }
-        let linear = |id: &AxisId| machine.axis(*id).kind == AxisKind::Linear;
-        let geometry = ["X", "Y", "Z"].map(|name| machine.axis_by_name(name).filter(linear));
+        let geometry = geometry_axes(machine);
         let zero_offsets = setup.zero_offsets.clone();
         let modal = Modal::new(&machine.feed, initial_frames(&zero_offsets, geometry));
         let known_place = KnownPlace::new(modal.frames.clone(), position);
@@ -121,11 +124,13 @@ impl Interpreter {
             number: 0,
             modal,
             zero_offsets,
+            basic_is_pending: false,
             work_area: WorkArea::default(),
+            tools: ToolState::new(setup.tools.clone()),
             position,
             programmed_lu: known_place.work_lu(),
             known_place,
-            variables: Variables::default(),
+            variables: Variables::new(geometry),
             memory: ChannelMemory::default(),
             main_run: MainRun::default(),
             trace_events: Vec::new(),

@@ -33,4 +33,4 @@ pub use load::{LoadError, Loaded, load, parse};
 pub use schema::schema;
 pub use shipped::{DEFAULT_MACHINE, shipped};
 pub use tools::{EDGE_MAX, Tool, ToolEdge, ToolTable, Workshop, ZeroOffset};
-pub use workshop::read_workshop;
+pub use workshop::{load_workshop, read_workshop};

@@ -42,7 +42,7 @@ pub struct Tool {
 }
 
 /// A tool edge.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct ToolEdge {
     /// $TC_DP1: type of the tool, such as 120 for an end mill.
     pub kind: u32,
@@ -56,6 +56,8 @@ pub struct ToolEdge {
     pub wear_radius_mm: f64,
     /// $TC_DP21, 22, 23: lengths of the adapter, added too.
     pub base_length_mm: [f64; 3],
+    /// $TC_DPn that a program has written and that have no effect here, by n.
+    pub others: BTreeMap<u32, f64>,
 }
 
 /// A settable frame, before it knows which axes turn.

@@ -28,12 +28,14 @@
 
 use super::Machine;
 use super::document::{Entry, Mark, Node, Texts, Value, read};
+use super::load::{LoadError, read_file};
 use super::section::Findings;
 use super::tools::{EDGE_MAX, Tool, ToolEdge, ToolTable, Workshop, ZeroOffset};
 use crate::base::diagnostics::{Diagnostic, SourceText, nearest};
 use crate::base::units::rad_from_deg;
 use crate::base::{AxisId, AxisKind, AxisVector};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 const TOP_KEYS: &[&str] = &["format", "change_with_m6", "tools", "frames"];
 const TOOL_KEYS: &[&str] = &["number", "name", "edges"];
@@ -48,6 +50,17 @@ const SCALE_MAX_RATIO: f64 = 1e6;
 const SCALE_MIN_RATIO: f64 = 1e-6;
 /// Highest T number and tool type.
 const NUMBER_MAX: u32 = 99_999_999;
+
+/// Reads and checks a workshop file.
+#[allow(clippy::result_large_err, reason = "once a run")]
+pub fn load_workshop(path: &Path, machine: &Machine) -> Result<Workshop, LoadError> {
+    let name = path.display().to_string();
+    let text = read_file(path).map_err(|reason| {
+        let message = format!("cannot read the tools or zero offsets {name}: {reason}");
+        LoadError::Unreadable(Diagnostic::error("M0001", message).help("give the path of a TOML file"))
+    })?;
+    read_workshop(&SourceText::new(name, text), machine).map_err(LoadError::Invalid)
+}
 
 /// Checks the text of a workshop file.
 pub fn read_workshop(source: &SourceText, machine: &Machine) -> Result<Workshop, Vec<Diagnostic>> {
@@ -141,6 +154,7 @@ impl Reader<'_> {
                 wear_length_mm: lengths("wear_length_mm"),
                 wear_radius_mm: radius("wear_radius_mm"),
                 base_length_mm: lengths("base_length_mm"),
+                others: BTreeMap::new(),
             };
             if edges.insert(number, edge).is_some() {
                 let message = format!("the edge D{number} is there twice");
