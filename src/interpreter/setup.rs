@@ -26,6 +26,9 @@ pub struct Setup {
     pub zero_offsets: Arc<ZeroOffsets>,
     /// Skip levels that are active, one bit each: bit 0 is `/` and `/0`.
     pub skip_levels: u16,
+    /// Nothing will move: what only the motion lacks (F) is a finding that does not end the program, so that a listing or a check goes on
+    /// to its end.
+    pub lists_only: bool,
 }
 
 impl From<ProgramSource> for Setup {
@@ -35,6 +38,7 @@ impl From<ProgramSource> for Setup {
             directories: Vec::new(),
             definitions: Vec::new(),
             skip_levels: 0,
+            lists_only: false,
             zero_offsets: Arc::default(),
             tools: None,
         }
