@@ -72,7 +72,10 @@ impl Interpreter {
         let known = &**name == NO_TOOL || self.tools.table.find(name).is_some();
         if !known && self.tools.is_given {
             let names: Vec<String> = self.tools.table.names().collect();
-            let near = nearest(name, names.iter().map(String::as_str)).map(|near| format!("did you mean `{near}`?"));
+            // A number near another is no typing error of it.
+            let is_number = name.bytes().all(|byte| byte.is_ascii_digit());
+            let near = nearest(name, names.iter().map(String::as_str)).filter(|_| !is_number);
+            let near = near.map(|near| format!("did you mean `{near}`?"));
             let help = near.unwrap_or_else(|| format!("the table has {}", shortened(&names)));
             return Err(Fault::new(
                 codes::UNKNOWN_TOOL,
