@@ -3,6 +3,7 @@
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
 use super::active_frames::ActiveFrames;
+use super::feed_state::FeedModes;
 use super::path_words::ModalCorner;
 use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
 use crate::base::AxisKind;
@@ -72,10 +73,10 @@ pub struct Modal {
     pub feedforward_active: bool,
     /// F; `None` before the first.
     pub feed: Option<ProgrammedFeed>,
+    /// What else the feed, spindle and positioning words have said.
+    pub feed_modes: FeedModes,
     /// S; 0 before the first.
     pub spindle_speed_rpm: f64,
-    /// G25 S, G26 S: lowest and highest spindle speed.
-    pub spindle_range_rpm: [f64; 2],
     /// Basic, settable and programmable frame.
     pub frames: Arc<ActiveFrames>,
 }
@@ -101,21 +102,10 @@ impl Modal {
             tool: None,
             feedforward_active: true,
             feed: None,
+            feed_modes: FeedModes::default(),
             spindle_speed_rpm: 0.0,
             frames: Arc::new(frames),
-            spindle_range_rpm: [0.0, f64::INFINITY],
         }
-    }
-
-    /// G25 S (lower), G26 S (upper).
-    pub fn limit_spindle(&mut self, upper: bool, speed_rpm: f64) {
-        self.spindle_range_rpm[usize::from(upper)] = speed_rpm;
-    }
-
-    /// S as far as G25 and G26 allow it.
-    pub fn limited_speed_rpm(&self, speed_rpm: f64) -> f64 {
-        // Not clamp: a program may set the limits the wrong way round.
-        speed_rpm.max(self.spindle_range_rpm[0]).min(self.spindle_range_rpm[1])
     }
 
     /// Modes for the wire; `exact_stop` = G9 in this block.

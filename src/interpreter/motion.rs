@@ -5,11 +5,12 @@
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
 use super::block::FEED_MIN;
-use super::modal::Motion;
+use super::modal::{Motion, ProgrammedFeed};
+use super::path_feed::Way;
 use super::placement::turn_outward;
 use super::run::Interpreter;
 use super::value::trimmed;
-use super::wire::{Event, Feed, MoveKind};
+use super::wire::{Event, MoveKind};
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, AxisVector, PartPoint, PerAxis};
 use crate::machine::Machine;
@@ -49,6 +50,10 @@ pub(super) struct MotionWords {
     pub turns: u32,
     /// G9.
     pub exact_stop: bool,
+    /// FB.
+    pub block_feed: Option<ProgrammedFeed>,
+    /// F or FB under G93 or G931: time of the block.
+    pub block_time_s: Option<f64>,
     /// SUPA, G53, G153.
     pub suppression: Option<Suppression>,
 }
@@ -62,6 +67,8 @@ impl Default for MotionWords {
             turns: 0,
             exact_stop: false,
             suppression: None,
+            block_feed: None,
+            block_time_s: None,
         }
     }
 }
@@ -109,17 +116,8 @@ impl Interpreter {
             return Err(Fault::new(codes::BAD_BLOCK, words.columns(), "I, J, K or CR without G2 or G3")
                 .label("only for circles"));
         }
-        if self.modal.motion != Motion::Rapid && self.modal.feed.is_none() {
-            let fault = Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
-                .label("expected F in this block or before it")
-                .help("write F with mm/min, or G0 for a rapid");
-            if !self.setup.lists_only {
-                return Err(fault);
-            }
-            if self.first_report(codes::NO_FEED) {
-                self.report(*fault);
-            }
-        }
+        let named = PerAxis::from_fn(|id| words.axes[id].is_some());
+        self.wait_for_moving(named);
         let kind = match self.modal.motion {
             Motion::Rapid => MoveKind::Rapid,
             Motion::Line => MoveKind::Line,
@@ -127,8 +125,14 @@ impl Interpreter {
         };
         self.check_work_area(words, &kind, &end)?;
         self.check_travel(words, end);
-        self.arrive(words, end);
-        let feed = self.feed_of(start, end, circle);
+        self.position = end;
+        self.note_programmed(words, start);
+        if kind == MoveKind::Rapid && self.rapid_by_axis(words.exact_stop) {
+            self.position = start;
+            self.rapid_axes(end, named, std::mem::take(events));
+            return Ok(());
+        }
+        let feed = self.feed_of(Way { start, end, kind: &kind }, words)?;
         self.emit(kind, feed, words.exact_stop, std::mem::take(events));
         Ok(())
     }
@@ -145,7 +149,8 @@ impl Interpreter {
             Some(_) => return false,
             None => self.modal.feed,
         };
-        let straight = motion == Motion::Rapid || (motion == Motion::Line && feed.is_some());
+        let feed_known = motion == Motion::Rapid || (motion == Motion::Line && feed.is_some());
+        let straight = feed_known && self.modal.feed_modes.plain;
         if !straight {
             return false;
         }
@@ -157,7 +162,7 @@ impl Interpreter {
         self.modal.feed = feed;
         if block.axes.as_slice().iter().any(Option::is_some) {
             let kind = if motion == Motion::Rapid { MoveKind::Rapid } else { MoveKind::Line };
-            let feed = self.feed_of(start, end, false);
+            let feed = self.plain_feed(start, end);
             self.emit(kind, feed, false, Vec::new());
         }
         true
@@ -203,20 +208,6 @@ impl Interpreter {
     /// Position of a machine axis when the tool tip is at `end`.
     fn machine_end_lu(&self, id: AxisId, end: &PartPoint) -> f64 {
         end.0[id] + self.modal.tool.as_ref().map_or(0.0, |tool| tool.length[id])
-    }
-
-    /// Feed of moves that stand still.
-    pub(super) fn standing_feed(&self) -> Feed {
-        match (self.modal.motion, self.modal.feed) {
-            (Motion::Rapid, _) | (_, None) => Feed::Rapid,
-            (_, Some(feed)) => Feed::Path { feed_lu_s: feed.linear_mm_s },
-        }
-    }
-
-    fn feed_of(&self, start: PartPoint, end: PartPoint, is_arc: bool) -> Feed {
-        let Some(feed) = self.modal.feed.filter(|_| self.modal.motion != Motion::Rapid) else { return Feed::Rapid };
-        let rotary = !is_arc && rotary_alone(&self.machine, start, end);
-        Feed::Path { feed_lu_s: if rotary { feed.rotary_rad_s } else { feed.linear_mm_s } }
     }
 
     /// A circle, calculated in the workpiece system and placed by the frames.
@@ -295,7 +286,7 @@ impl Interpreter {
     }
 
     /// One warning per axis and run.
-    fn check_travel(&mut self, words: &MotionWords, end: PartPoint) {
+    pub(super) fn check_travel(&mut self, words: &MotionWords, end: PartPoint) {
         let machine = self.machine.clone();
         for id in machine.axis_ids() {
             let axis = machine.axis(id);

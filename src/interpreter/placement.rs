@@ -114,10 +114,10 @@ impl Interpreter {
         Ok(base_lu + value_lu)
     }
 
-    /// The axes have reached the end of a block with these words: from here incremental words count.
-    pub(super) fn arrive(&mut self, words: &MotionWords, end: PartPoint) {
-        let start_lu = self.work_position_lu(None);
-        self.position = end;
+    /// The axes have gone from `start` to where they stand by these words: from here incremental words count.
+    pub(super) fn note_programmed(&mut self, words: &MotionWords, start: PartPoint) {
+        let start_lu = self.frames_of(None).frame.inward(&start.0);
+        let end = self.position;
         let work_lu = self.work_position_lu(None);
         for id in self.machine.axis_ids() {
             let incremental =
@@ -134,7 +134,7 @@ impl Interpreter {
         self.known_place = KnownPlace { frames: self.modal.frames.clone(), position: end, work_lu };
     }
 
-    /// As `arrive`, for a block of the fast path.
+    /// As `note_programmed`, for a block of the fast path.
     pub(super) fn know_place(&mut self, end: PartPoint, work: PlainWork) {
         self.position = end;
         self.programmed_lu = work.programmed_lu;

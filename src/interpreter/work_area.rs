@@ -61,7 +61,7 @@ impl Interpreter {
                 .label("expected axes or S"));
         }
         if let Some((speed_rpm, _)) = spindle {
-            self.modal.limit_spindle(upper, speed_rpm);
+            self.modal.feed_modes.spindle_limits_rpm[usize::from(upper)] = Some(speed_rpm);
         }
         for id in self.machine.axis_ids() {
             if let Some(word) = &words.axes[id] {
