@@ -280,7 +280,9 @@ impl Held {
     /// The block without what blends take of it.
     fn part(self, tail_lu: f64, stop_at_end: bool) -> ContourPiece {
         let curve = self.shortened(tail_lu);
-        self.head.piece(PieceKind::Block(curve), stop_at_end)
+        let length_lu = self.curve.length_lu();
+        let range_ratio = [self.head_lu / length_lu, 1.0 - tail_lu / length_lu];
+        ContourPiece { range_ratio, ..self.head.piece(PieceKind::Block(curve), stop_at_end) }
     }
 
     fn shortened(&self, tail_lu: f64) -> Curve {
@@ -296,7 +298,7 @@ impl Held {
 impl Head {
     fn piece(self, kind: PieceKind, stop_at_end: bool) -> ContourPiece {
         let Self { block, feed, modes, events, blocks_begun } = self;
-        ContourPiece { block, kind, feed, modes, events, blocks_begun, block_length_lu: None, stop_at_end }
+        ContourPiece { block, kind, feed, modes, events, blocks_begun, range_ratio: [0.0, 1.0], stop_at_end }
     }
 }
 
