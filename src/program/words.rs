@@ -570,6 +570,11 @@ pub fn role(word: &str) -> Option<Role> {
     table.binary_search_by(|(known, _)| compare(known)).ok().map(|found| table[found].1)
 }
 
+/// A word with that role: the first in alphabetical order.
+pub fn spelling(wanted: Role) -> Option<&'static str> {
+    table().iter().find(|(_, role)| *role == wanted).map(|(word, _)| *word)
+}
+
 /// True for a function that is one only before a bracket.
 pub fn is_free_name(role: Role) -> bool {
     match role {
