@@ -18,7 +18,7 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
 const SEED: u64 = 7_112_026;
 /// Mutations of each input. `SOLLWERT_FUZZ_ROUNDS` asks for more.
-const ROUNDS: u32 = 12;
+const ROUNDS: u32 = 3;
 /// What stays allocated after an input is done with: caches of the process, nothing more.
 const KEPT_BYTES_MAX: usize = 4 << 20;
 /// Pieces of the language that mutations put in.
