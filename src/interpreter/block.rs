@@ -164,9 +164,28 @@ impl Interpreter {
         block: &mut Collected,
     ) -> Outcome<()> {
         match address {
+            IndexedAddress::Axis => self.computed_axis(index, values, columns, block),
             IndexedAddress::Polynomial => self.polynomial(index, values, columns, block),
             IndexedAddress::AxisTolerance => self.axis_tolerance(index, values, columns),
             _ => self.feed_indexed(address, index, values, columns, block),
+        }
+    }
+
+    /// AX[axis]=value is the word of that axis.
+    fn computed_axis(
+        &mut self,
+        index: Option<&Expr>,
+        values: &IndexedValue,
+        columns: &Columns,
+        block: &mut Collected,
+    ) -> Outcome<()> {
+        match (index, values) {
+            (Some(index), IndexedValue::One(value)) => {
+                let axis = self.axis_of(index)?;
+                self.address(Address::Axis(axis), value, columns, block)
+            }
+            _ => Err(Fault::new(codes::EXPECTED_VALUE, columns.clone(), "AX needs an axis in its brackets")
+                .label("expected a form such as AX[X]=10")),
         }
     }
 
