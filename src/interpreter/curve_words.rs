@@ -151,21 +151,26 @@ impl Interpreter {
         Ok((AxisWord { typed, form: end.form, columns: columns.clone() }, higher))
     }
 
-    /// The axis in square brackets.
+    /// The axis in square brackets: its name, or an expression of type AXIS.
     fn indexed_axis(&self, index: &Expr, columns: &Columns) -> Outcome<AxisId> {
-        let name = match &index.kind {
-            ExprKind::Variable { name, indices } if indices.is_empty() && self.machine.axis_by_name(name).is_some() => {
-                name.to_string()
-            }
-            _ => match evaluate(index, self)? {
-                Value::Axis(Some(id)) => return Ok(id),
-                _ => String::new(),
-            },
-        };
-        self.machine.axis_by_name(&name).ok_or_else(|| {
+        let unknown = || {
             Fault::new(codes::UNKNOWN_AXIS, columns.clone(), "PO of something that is no axis")
                 .label("expected an axis of the machine")
-        })
+        };
+        let name = match &index.kind {
+            ExprKind::Variable { name, indices } if indices.is_empty() => Some(name),
+            _ => None,
+        };
+        if let Some(axis) = name.and_then(|name| self.machine.axis_by_name(name)) {
+            return Ok(axis);
+        }
+        match evaluate(index, self) {
+            Ok(Value::Axis(Some(axis))) => Ok(axis),
+            Ok(_) => Err(unknown()),
+            // A name that is neither an axis nor a variable.
+            Err(_) if name.is_some() => Err(unknown()),
+            Err(fault) => Err(fault),
+        }
     }
 
     /// Sets the pole if the block asks for it; its axis words are no positions then.

@@ -43,24 +43,27 @@ fn spatial_text(machine: &Machine, arc: &SpatialArcGeometry) -> String {
 
 fn piece_text(machine: &Machine, piece: &PolynomialPiece) -> String {
     let mut text = format!("p{}", trimmed(piece.parameter_end_ratio));
-    let rational = piece.denominator_ratio[1..].iter().any(|coefficient| *coefficient != 0.0);
+    let denominator = powers(&piece.denominator_ratio);
     for id in machine.axis_ids() {
         let axis = machine.axis(id);
         let rotary = axis.kind == AxisKind::Rotary;
-        let own = piece.numerator_lu.each_ref().map(|row| if rotary { deg_from_rad(row[id]) } else { row[id] });
-        if rational || own[1..].iter().any(|coefficient| *coefficient != 0.0) {
-            text.push_str(&format!(" {}({})", axis.name, powers(&own)));
+        let own = powers(&piece.numerator_lu.each_ref().map(|row| if rotary { deg_from_rad(row[id]) } else { row[id] }));
+        // An axis that stands has no word, unless it is divided.
+        if denominator.len() > 1 || own.len() > 1 {
+            text.push_str(&format!(" {}({})", axis.name, own.join(",")));
         }
     }
-    if rational {
-        text.push_str(&format!(" D({})", powers(&piece.denominator_ratio)));
+    if denominator.len() > 1 {
+        text.push_str(&format!(" D({})", denominator.join(",")));
     }
     text
 }
 
-/// Without the highest ones that are 0.
-fn powers(coefficients: &[f64; 6]) -> String {
-    let count = coefficients.iter().rposition(|coefficient| *coefficient != 0.0).map_or(1, |last| last + 1);
-    let numbers: Vec<String> = coefficients[..count].iter().map(|coefficient| trimmed(*coefficient)).collect();
-    numbers.join(",")
+/// As numbers of a listing, without the highest ones that are 0 there.
+fn powers(coefficients: &[f64; 6]) -> Vec<String> {
+    let mut numbers: Vec<String> = coefficients.iter().map(|coefficient| trimmed(*coefficient)).collect();
+    while numbers.len() > 1 && numbers.last().is_some_and(|last| last == "0" || last == "-0") {
+        numbers.pop();
+    }
+    numbers
 }
