@@ -8,14 +8,14 @@
 use super::blend_limits;
 use super::profile::{Bounds, SpeedCap};
 use super::ramp::Dynamics;
+use super::worst::Worst;
 use super::{Limit, LimitKind};
 use crate::base::AxisId;
-use crate::geometry::{Arc, Curve, CurveState};
+use crate::geometry::Curve;
 use crate::interpreter::Feed;
 use crate::kinematics::JointState;
 use crate::machine::{AccelerationMode, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine};
 use crate::smoothing::ContourPiece;
-use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The jerk that is left on an arc is split in these many parts between its two uses.
 const JERK_SHARES: u32 = 16;
@@ -72,6 +72,9 @@ pub(super) struct Ends {
     pub rotary_only: bool,
 }
 
+/// Which jerk of an axis holds.
+type JerkMax = fn(&AxisLimits) -> f64;
+
 impl AxisRules {
     pub(super) fn new(machine: &Machine) -> Self {
         let setpoint_period_s = machine.cycle.time_base.setpoint_period_s();
@@ -108,12 +111,21 @@ impl AxisRules {
     }
 
     /// Limits of a piece on its curve.
-    pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
+    /// `worst` are the greatest demands along a curve that has no closed form for them.
+    pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends, worst: Option<&Worst>) -> PieceLimits {
         let feed = feed_cap(&piece.feed);
         let jerk_limited = piece.modes.acceleration_mode == AccelerationMode::Soft;
+        let in_block: JerkMax = |limits| limits.jerk_max_lu_s3;
+        let in_blend: JerkMax = |limits| limits.transition_jerk_max_lu_s3;
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
-            Curve::Arc(arc) => self.arc(arc, feed, jerk_limited),
+            Curve::Arc(arc) => self.curved(&Worst::on_arc(arc), in_block, feed, jerk_limited),
+            Curve::SpatialArc(arc) => self.curved(&Worst::on_spatial_arc(arc), in_block, feed, jerk_limited),
+            Curve::Polynomial(_) => match worst {
+                Some(worst) => self.curved(worst, if ends.blend { in_blend } else { in_block }, feed, jerk_limited),
+                // Unknown demands allow nothing: the planner refuses the piece.
+                None => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
+            },
             Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
         }
     }
@@ -130,12 +142,12 @@ impl AxisRules {
 
     /// An arc or helix: the worst direction met on it (models/arcs.md section 4), with the radial shares of models/local-smoothing.md
     /// section 2, so that the sums over tangent and normal hold and not only each term.
-    fn arc(&self, arc: &Arc, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
-        let worst = WorstOnArc::new(arc);
+    /// The same for any other curve.
+    fn curved(&self, worst: &Worst, jerk_max: JerkMax, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
         let (ra, rj) = (self.radial_acceleration_share, self.radial_jerk_share);
         let velocity = self.largest(|axis, limits| worst.first(axis) / limits.velocity_max_lu_s);
         let radial = self.largest(|axis, limits| worst.second(axis) / (ra * limits.acceleration_max_lu_s2));
-        let turning = self.largest(|axis, limits| worst.third(axis) / (rj * limits.jerk_max_lu_s3));
+        let turning = self.largest(|axis, limits| worst.third(axis) / (rj * jerk_max(limits)));
         let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
         cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2));
         if jerk_limited {
@@ -146,16 +158,15 @@ impl AxisRules {
         if !jerk_limited {
             return PieceLimits::new(cap, cap, acceleration, acceleration, jerk_limited);
         }
-        let left =
-            |axis: AxisId, limits: &AxisLimits| limits.jerk_max_lu_s3 - cap.velocity_lu_s.powi(3) * worst.third(axis);
-        self.share_jerk(&worst, cap, acceleration, left)
+        let left = |axis: AxisId, limits: &AxisLimits| jerk_max(limits) - cap.velocity_lu_s.powi(3) * worst.third(axis);
+        self.share_jerk(worst, cap, acceleration, left)
     }
 
     /// Splits the jerk that turning leaves between `3 v a |q''|` and `j |q'|`: among some splits that one which reaches the cap
     /// from rest in the shortest time. `left` is positive for every axis: turning takes R_J of the jerk at most.
     fn share_jerk(
         &self,
-        worst: &WorstOnArc,
+        worst: &Worst,
         cap: SpeedCap,
         acceleration: Demand,
         left: impl Fn(AxisId, &AxisLimits) -> f64,
@@ -224,6 +235,14 @@ impl PieceLimits {
         Self { cap, ramp_cap, bounds }
     }
 
+    /// About what is left for changes of speed on a curve, to judge how much way one takes.
+    pub(super) fn rough_dynamics(rules: &AxisRules, worst: &Worst, jerk_limited: bool) -> Dynamics {
+        let (ra, rj) = (rules.radial_acceleration_share, rules.radial_jerk_share);
+        let a = rules.largest(|axis, limits| worst.first(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
+        let j = rules.largest(|axis, limits| worst.first(axis) / ((1.0 - rj) * limits.jerk_max_lu_s3));
+        Dynamics { acceleration_lu_s2: 1.0 / a.demand_ratio, jerk_lu_s3: jerk_limited.then_some(1.0 / j.demand_ratio) }
+    }
+
     /// Highest speed at the end of `length_lu` if it is `from` at its start, and what sets it; the same for braking to exactly
     /// `from`.
     pub(super) fn reach(&self, from: SpeedCap, length_lu: f64) -> SpeedCap {
@@ -261,62 +280,4 @@ fn feed_cap(feed: &Feed) -> SpeedCap {
         Feed::Varying { feeds_lu_s } => feeds_lu_s.iter().copied().fold(f64::INFINITY, f64::min),
     };
     SpeedCap { velocity_lu_s, limit: Limit { kind: LimitKind::Feed, axis: None } }
-}
-
-/// Largest |q'|, |q''| and |q'''| of each axis over an arc: axis-parallel directions between its ends included.
-struct WorstOnArc {
-    /// |cos| of the polar angle, its largest; |sin| likewise.
-    cos_ratio: f64,
-    sin_ratio: f64,
-    state: CurveState,
-    plane: [AxisId; 2],
-    radius_mm: f64,
-    turn_rate_per_mm: f64,
-}
-
-impl WorstOnArc {
-    fn new(arc: &Arc) -> Self {
-        let (a, b) = (arc.angle_start_rad(), arc.angle_end_rad());
-        let (low, high) = (a.min(b), a.max(b));
-        // |cos| is 1 at multiples of pi, |sin| a quarter turn further.
-        let meets = |offset_rad: f64| ((low - offset_rad) / PI).ceil() * PI + offset_rad <= high;
-        let cos_ratio = if meets(0.0) { 1.0 } else { a.cos().abs().max(b.cos().abs()) };
-        let sin_ratio = if meets(FRAC_PI_2) { 1.0 } else { a.sin().abs().max(b.sin().abs()) };
-        Self {
-            cos_ratio,
-            sin_ratio,
-            state: arc.at(0.0),
-            plane: arc.plane(),
-            radius_mm: arc.radius_mm().abs(),
-            turn_rate_per_mm: arc.turn_rate_per_mm().abs(),
-        }
-    }
-
-    /// Largest share of the axis in the tangent (`along`) or in the normal.
-    fn in_plane(&self, axis: AxisId, along: bool) -> f64 {
-        let [first, second] = self.plane;
-        if axis == first {
-            if along { self.sin_ratio } else { self.cos_ratio }
-        } else if axis == second {
-            if along { self.cos_ratio } else { self.sin_ratio }
-        } else {
-            0.0
-        }
-    }
-
-    fn first(&self, axis: AxisId) -> f64 {
-        if self.plane.contains(&axis) {
-            self.radius_mm * self.turn_rate_per_mm * self.in_plane(axis, true)
-        } else {
-            self.state.first[axis].abs()
-        }
-    }
-
-    fn second(&self, axis: AxisId) -> f64 {
-        self.radius_mm * self.turn_rate_per_mm.powi(2) * self.in_plane(axis, false)
-    }
-
-    fn third(&self, axis: AxisId) -> f64 {
-        self.radius_mm * self.turn_rate_per_mm.powi(3) * self.in_plane(axis, true)
-    }
 }

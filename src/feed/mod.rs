@@ -9,7 +9,10 @@ mod limits;
 mod planner;
 pub mod profile;
 pub mod ramp;
+mod scan;
+mod split;
 mod wire;
+mod worst;
 
 pub use planner::Planner;
 pub use wire::*;

@@ -143,6 +143,7 @@ fn visit_target(target: &Target, columns: &Columns, visit: &mut impl FnMut(&Arc<
             visit(name, &(columns.start..end));
             indices.iter().for_each(|index| visit_names(index, visit));
         }
+        Target::System(system) => system.indices.iter().for_each(|index| visit_names(index, visit)),
     }
 }
 

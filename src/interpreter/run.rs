@@ -6,8 +6,9 @@
 use super::modal::Modal;
 use super::path_words::CornerWords;
 use super::setup::Setup;
+use super::system_values::ChannelMemory;
 use super::variables::Variables;
-use super::wire::{Event, Feed, Move, MoveKind};
+use super::wire::{Event, Feed, MainRun, Move, MoveKind};
 use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
@@ -31,7 +32,6 @@ const KEPT_LINE_BYTES_MAX: usize = 512;
 pub struct Interpreter {
     pub(super) source: ProgramSource,
     /// What lies around the program.
-    #[allow(dead_code)]
     pub(super) setup: Arc<Setup>,
     pub(super) program: ProgramId,
     pub(super) machine: Arc<Machine>,
@@ -50,6 +50,18 @@ pub struct Interpreter {
     /// Translation that each axis had when it last moved.
     pub(super) applied_lu: crate::base::AxisVector,
     pub(super) variables: Variables,
+    /// Markers, parameters and clocks of the channel.
+    pub(super) memory: ChannelMemory,
+    /// What preparation said when the path came to rest last.
+    pub(super) main_run: MainRun,
+    /// Events of assignments in the block in execution.
+    pub(super) trace_events: Vec<Event>,
+    /// The path rests for the block in execution: it may read the main run.
+    rests_for_main_run: bool,
+    /// The definition files have been executed.
+    globals_defined: bool,
+    /// A definition file is being executed.
+    pub(super) in_definitions: bool,
     /// Moves of the block in execution.
     pub(super) queue: VecDeque<Move>,
     /// Block numbers that jumps have found, by line and direction of the jump.
@@ -96,6 +108,12 @@ impl Interpreter {
             position,
             applied_lu: crate::base::AxisVector::zero(),
             variables: Variables::default(),
+            memory: ChannelMemory::default(),
+            main_run: MainRun::default(),
+            trace_events: Vec::new(),
+            rests_for_main_run: false,
+            globals_defined: false,
+            in_definitions: false,
             queue: VecDeque::new(),
             found_numbers: BTreeMap::new(),
             warnings: Vec::new(),
@@ -146,6 +164,11 @@ impl Interpreter {
         }
     }
 
+    /// Tells what the main run is at; called when the path rests for a `StopPreparation`, before the next move is asked for.
+    pub fn tell_main_run(&mut self, main_run: MainRun) {
+        self.main_run = main_run;
+    }
+
     /// Warnings since the last call; each word once a run.
     pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.warnings)
@@ -163,6 +186,9 @@ impl Interpreter {
 
     /// Executes one line.
     fn step(&mut self) -> Outcome<()> {
+        if !std::mem::replace(&mut self.globals_defined, true) {
+            self.define_globals()?;
+        }
         let source = self.source.clone();
         let Some((bytes, following)) = source.line_bytes(self.next) else {
             self.end();
@@ -180,6 +206,13 @@ impl Interpreter {
             return Ok(());
         }
         let block = self.parsed(bytes)?;
+        if block.reads_main_run && !std::mem::replace(&mut self.rests_for_main_run, true) {
+            // The block itself is executed when the path rests.
+            self.next = self.current;
+            self.emit(MoveKind::StopPreparation, self.standing_feed(), false, Vec::new());
+            return Ok(());
+        }
+        self.rests_for_main_run = false;
         if block.statement != Statement::Words(Vec::new()) {
             self.number += 1;
         }

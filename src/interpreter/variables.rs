@@ -19,6 +19,8 @@ const ELEMENTS_MAX: usize = 100_000;
 pub struct Variables {
     parameters: Vec<f64>,
     declared: BTreeMap<Arc<str>, Variable>,
+    /// GUD: known to all programs.
+    global: BTreeMap<Arc<str>, Variable>,
     elements: usize,
 }
 
@@ -48,9 +50,27 @@ impl Variables {
         Ok(())
     }
 
+    /// True if there is a variable of that name.
+    pub fn is_declared(&self, name: &str) -> bool {
+        self.find(name).is_some()
+    }
+
+    fn find(&self, name: &str) -> Option<&Variable> {
+        self.declared.get(name).or_else(|| self.global.get(name))
+    }
+
+    fn find_mut(&mut self, name: &str) -> Option<&mut Variable> {
+        self.declared.get_mut(name).or_else(|| self.global.get_mut(name))
+    }
+
+    /// What has been defined so far becomes global: the end of a definition file.
+    pub fn make_global(&mut self) {
+        self.global.append(&mut self.declared);
+    }
+
     /// True if the name stands for a STRING without indices: a computed jump target.
     pub fn text(&self, name: &str) -> Option<Arc<str>> {
-        match self.declared.get(name)?.values.as_slice() {
+        match self.find(name)?.values.as_slice() {
             [Value::Text(text)] => Some(text.clone()),
             _ => None,
         }
@@ -101,20 +121,25 @@ impl Variables {
             VariableType::Char | VariableType::Int => Value::Int(0),
             VariableType::Real => Value::Real(0.0),
             VariableType::Text(_) => Value::Text(Arc::from("")),
+            VariableType::Axis => Value::Axis(None),
+            VariableType::Frame => {
+                return Err(
+                    Fault::new(codes::NOT_BUILT, columns.clone(), "FRAME: not built yet").label("not built yet")
+                );
+            }
         };
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
         Ok(())
     }
 
-    /// True if DEF has made it.
-    pub fn is_declared(&self, name: &str) -> bool {
-        self.declared.contains_key(name)
-    }
-
     /// Value of a variable or array element.
     pub fn get(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<Value> {
         let variable = self.declared(name, columns)?;
+        if let Some((at, indices)) = variable.character(indices) {
+            let place = variable.place(name, indices, columns)?;
+            return character(&variable.values[place], at, columns);
+        }
         let place = variable.place(name, indices, columns)?;
         Ok(variable.values[place].clone())
     }
@@ -123,9 +148,18 @@ impl Variables {
     pub fn set(&mut self, name: &str, indices: &[i32], value: &Value, columns: (&Columns, &Columns)) -> Outcome<()> {
         let (name_columns, value_columns) = columns;
         let variable = self.declared(name, name_columns)?;
-        let place = variable.place(name, indices, name_columns)?;
-        let converted = convert(variable.variable_type, value, value_columns)?;
-        if let Some(variable) = self.declared.get_mut(name) {
+        let (place, converted) = match variable.character(indices) {
+            Some((at, indices)) => {
+                let place = variable.place(name, indices, name_columns)?;
+                let code = convert(VariableType::Char, value, value_columns)?;
+                (place, with_character(&variable.values[place], at, &code, name_columns)?)
+            }
+            None => {
+                let place = variable.place(name, indices, name_columns)?;
+                (place, convert(variable.variable_type, value, value_columns)?)
+            }
+        };
+        if let Some(variable) = self.find_mut(name) {
             variable.values[place] = converted;
         }
         Ok(())
@@ -140,7 +174,7 @@ impl Variables {
 
     /// Sets the element at a place given by [`Self::fill_range`].
     pub fn set_place(&mut self, name: &str, place: usize, value: &Value, columns: &Columns) -> Outcome<()> {
-        if let Some(variable) = self.declared.get_mut(name)
+        if let Some(variable) = self.find_mut(name)
             && let Some(element) = variable.values.get_mut(place)
         {
             *element = convert(variable.variable_type, value, columns)?;
@@ -149,8 +183,8 @@ impl Variables {
     }
 
     fn declared(&self, name: &str, columns: &Columns) -> Outcome<&Variable> {
-        self.declared.get(name).ok_or_else(|| {
-            let near = nearest(name, self.declared.keys().map(|known| &**known));
+        self.find(name).ok_or_else(|| {
+            let near = nearest(name, self.declared.keys().chain(self.global.keys()).map(|known| &**known));
             undeclared(name, near, columns)
         })
     }
@@ -166,7 +200,42 @@ pub fn undeclared(name: &str, near: Option<&str>, columns: &Columns) -> Box<Faul
         ))
 }
 
+/// Character `at` of a text, as CHAR.
+fn character(text: &Value, at: i32, columns: &Columns) -> Outcome<Value> {
+    let Value::Text(text) = text else { return Ok(Value::Int(0)) };
+    let found = usize::try_from(at).ok().and_then(|at| text.chars().nth(at));
+    found.map(|found| Value::Int(found as i32)).ok_or_else(|| no_character(text, at, columns))
+}
+
+/// The text with another character `at`; just behind its end it grows.
+fn with_character(text: &Value, at: i32, code: &Value, columns: &Columns) -> Outcome<Value> {
+    let (Value::Text(text), Value::Int(code)) = (text, code) else { return Ok(text.clone()) };
+    let mut characters: Vec<char> = text.chars().collect();
+    let new = u32::try_from(*code).ok().and_then(char::from_u32).unwrap_or(' ');
+    match usize::try_from(at).ok().and_then(|at| characters.get_mut(at)) {
+        Some(old) => *old = new,
+        None => return Err(no_character(text, at, columns)),
+    }
+    Ok(Value::Text(characters.into_iter().collect::<String>().into()))
+}
+
+fn no_character(text: &str, at: i32, columns: &Columns) -> Box<Fault> {
+    let length = text.chars().count();
+    Fault::new(codes::BAD_INDEX, columns.clone(), format!("this text has no character {at}")).label(if length == 0 {
+        "the text is empty".to_owned()
+    } else {
+        format!("expected 0 to {}", length - 1)
+    })
+}
+
 impl Variable {
+    /// One index more than dimensions, of a STRING: the place of a character, and the indices before it.
+    fn character<'i>(&self, indices: &'i [i32]) -> Option<(i32, &'i [i32])> {
+        let (last, before) = indices.split_last()?;
+        (matches!(self.variable_type, VariableType::Text(_)) && before.len() == self.dimensions.len())
+            .then_some((*last, before))
+    }
+
     fn place(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<usize> {
         if indices.len() != self.dimensions.len() {
             let message = format!("`{name}` has {} dimensions", self.dimensions.len());
@@ -211,6 +280,14 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
         (VariableType::Char, Value::Text(text)) if text.chars().count() == 1 => {
             Value::Int(text.chars().next().map_or(0, |c| c as i32))
         }
+        (VariableType::Axis, Value::Axis(_)) => value.clone(),
+        (VariableType::Axis, _) => {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only an axis can be stored in an AXIS")
+                .label("expected the name of an axis")
+                .help("AXNAME makes an axis of a text"));
+        }
+        // DEF refuses it.
+        (VariableType::Frame, value) => value.clone(),
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
         (VariableType::Real, value) => Value::Real(value.number(columns)?),
         (VariableType::Int, value) => Value::Int(value.integer(columns)?),

@@ -16,6 +16,8 @@ pub mod source;
 mod statements;
 pub mod structure;
 pub mod syntax;
+mod system_variables;
+mod visit;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
@@ -24,6 +26,7 @@ pub use parser::{parse, whole_number};
 pub use source::{Cursor, ProgramSource};
 pub use statements::{TEXT_MAX, block_number, visit_names};
 pub use syntax::Block;
+pub use system_variables::{SYSTEM_VARIABLES, SystemVariable};
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 
 use std::sync::Arc;

@@ -29,7 +29,6 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
     ),
     (&["CALL", "PCALL", "ISOCALL", "REPEATB"], "sub-programs and block repetition are not built yet"),
     (&["DIAMON", "DIAM90"], "diameter programming is not built yet"),
-    (&["AXIS", "FRAME"], "variables of type AXIS and FRAME are not built yet"),
     (&["WRITE", "READ", "DELETE", "ISFILE"], "reading and writing files from the program is not built yet"),
     (&["SETAL"], "alarms from the program are not built yet"),
     (&["MEAS", "MEAW", "MEAC"], "measuring is not built yet"),
@@ -37,7 +36,4 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
 ];
 
 /// Functions of expressions that are not built.
-pub(super) const FUNCTIONS_NOT_BUILT: &[&str] = &[
-    "CTRANS", "CROT", "CROTS", "CSCALE", "CMIRROR", "CFINE", "MEAFRAME", "STRLEN", "SUBSTR", "TOUPPER", "TOLOWER",
-    "INDEX", "RINDEX", "MINDEX", "NUMBER", "ISNUMBER", "AXNAME", "ISAXIS", "AXSTRING", "ISVAR",
-];
+pub(super) const FUNCTIONS_NOT_BUILT: &[&str] = &["MEAFRAME", "GETMDACT", "SPI", "GETTCOR"];

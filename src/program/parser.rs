@@ -10,9 +10,10 @@ use super::expression::{arguments, expected, expression, indices, not_built, unu
 use super::lexer::{Lexer, Number, Token};
 use super::statements::{initial, statement};
 use super::syntax::{
-    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, IndexedValue, Initial, Statement, Target, Word,
-    WordKind,
+    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, IndexedValue, Initial, Statement, SystemName,
+    Target, Word, WordKind,
 };
+use super::visit::reads_main_run;
 use super::words::{self, Control, IndexedAddress, NotActedOn, Role};
 
 /// Values that PO may have: the end point and coefficients.
@@ -22,9 +23,17 @@ const INTEGER_MAX: f64 = 2_147_483_647.0;
 
 /// Parses a line.
 pub fn parse(text: &str, dialect: &Dialect) -> Outcome<Block> {
+    let mut block = parse_words(text, dialect)?;
+    if text.contains('$') {
+        block.reads_main_run = reads_main_run(&block.statement);
+    }
+    Ok(block)
+}
+
+fn parse_words(text: &str, dialect: &Dialect) -> Outcome<Block> {
     let mut lexer = Lexer::new(text);
     let empty = Statement::Words(Vec::new());
-    let mut block = Block { skip: None, number: None, label: None, statement: empty };
+    let mut block = Block { skip: None, number: None, label: None, statement: empty, reads_main_run: false };
     if lexer.peek_byte() == Some(b'%') {
         // Header of a transmission or archive: `%_N_NAME_MPF`.
         return Ok(block);
@@ -380,11 +389,8 @@ impl<'a> WordParser<'_, 'a, '_> {
                 return self.assignment(Target::Parameter(Expr { columns, kind: ExprKind::Int(number) }));
             }
         }
-        let known = if upper.starts_with("$TC_") { "$TC_" } else { upper.as_str() };
-        match words::role(known) {
-            Some(Role::NotActedOn(entry)) => self.pass_over(entry),
-            _ => Err(not_built(name, "this system variable cannot be written yet", columns)),
-        }
+        let indices = indices(self.lexer)?;
+        self.assignment(Target::System(SystemName { name: upper.into(), indices }))
     }
 
     /// A word of two letters or more.

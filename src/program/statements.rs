@@ -135,12 +135,44 @@ fn case(lexer: &mut Lexer) -> Outcome<Case> {
 }
 
 fn definition(lexer: &mut Lexer) -> Outcome<Definition> {
+    let global = keyword(lexer, "NCK") || keyword(lexer, "CHAN");
+    attributes(lexer)?;
     let variable_type = variable_type(lexer)?;
     let mut variables = vec![defined_variable(lexer)?];
     while lexer.take(",") {
         variables.push(defined_variable(lexer)?);
     }
-    Ok(Definition { variable_type, variables })
+    // Limits of the value may also stand behind it.
+    attributes(lexer)?;
+    Ok(Definition { global, variable_type, variables })
+}
+
+/// Attributes of a definition that a simulation passes over: protection, synchronisation, physical unit, limits.
+const ATTRIBUTES: [(&str, bool); 15] = [
+    ("SYNR", false),
+    ("SYNW", false),
+    ("SYNRW", false),
+    ("APR", true),
+    ("APW", true),
+    ("APX", true),
+    ("APRP", true),
+    ("APWP", true),
+    ("APRB", true),
+    ("APWB", true),
+    ("PHU", true),
+    ("LLI", true),
+    ("ULI", true),
+    ("IPO", false),
+    ("PRLOC", false),
+];
+
+fn attributes(lexer: &mut Lexer) -> Outcome<()> {
+    while let Some((_, has_value)) = ATTRIBUTES.iter().find(|(word, _)| keyword(lexer, word)) {
+        if *has_value {
+            expression(lexer)?;
+        }
+    }
+    Ok(())
 }
 
 fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
@@ -152,10 +184,9 @@ fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
         "INT" => VariableType::Int,
         "REAL" => VariableType::Real,
         "STRING" => VariableType::Text(text_length(lexer)?),
-        "AXIS" | "FRAME" => {
-            return Err(not_built(&name, "variables of this type are not built yet", before.columns_of_next()));
-        }
-        _ => return Err(expected(&before, "a type: BOOL, CHAR, INT, REAL or STRING[n]")),
+        "AXIS" => VariableType::Axis,
+        "FRAME" => VariableType::Frame,
+        _ => return Err(expected(&before, "a type: BOOL, CHAR, INT, REAL, STRING[n], AXIS or FRAME")),
     })
 }
 
@@ -251,6 +282,7 @@ pub fn visit_names(expression: &Expr, visit: &mut impl FnMut(&Arc<str>, &Columns
             visit_names(&operands.1, visit);
         }
         ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| visit_names(argument, visit)),
+        ExprKind::System(system) => system.indices.iter().for_each(|index| visit_names(index, visit)),
         ExprKind::Bool(_) | ExprKind::Int(_) | ExprKind::Real(_) | ExprKind::Text(_) => {}
     }
 }

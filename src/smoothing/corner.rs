@@ -212,7 +212,9 @@ impl Rules {
     fn wanted_lu(&self, before: &Side<'_>, after: &Side<'_>, u: &AxisVector, v: &AxisVector) -> f64 {
         match before.modes.path_mode {
             PathMode::G641 => self.rounding_distance_mm(before, after),
-            PathMode::G643 | PathMode::G644 => f64::INFINITY,
+            PathMode::G643 if self.contour_tolerance_mm(before, after) > 0.0 => f64::INFINITY,
+            PathMode::G643 => 0.0,
+            PathMode::G644 => f64::INFINITY,
             _ => {
                 let [u, v] = [u.masked(&self.linear), v.masked(&self.linear)];
                 let epsilon = self.beta(&u, &v) * self.contour_tolerance_mm(before, after);

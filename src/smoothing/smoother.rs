@@ -2,8 +2,9 @@
 //!
 //! In: [`Move`]s in order, pushed. Out: [`ContourPiece`]s in order: every motion block once (cut where blends take its ends), the
 //! blends, the waits. On its way a block passes three stages: what RND and CHF put between blocks (`insert`), the compressor
-//! (`compressor`), the junctions (`corner`). One motion block is held back, because the next one decides how it ends. Events of blocks without motion go
-//! to the next block; where none follows, to a wait at the end.
+//! (`compressor`), the junctions (`corner`). One motion block is held back, because the next one decides how it ends, and more where
+//! a corner is to be filled or blocks are compressed. Events of blocks without motion go to the next block; where none follows, to a
+//! wait at the end.
 //!
 //! Moves without displacement make no piece and no junction: their events and their count go to the next block. Displacement below
 //! [`DISPLACEMENT_MIN_LU`] is none; it is not lost, because the next block starts where the contour is.
@@ -17,7 +18,7 @@ use super::unrounded::{Reason, Unrounded};
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, PartPoint};
-use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
+use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, PolynomialCurve, SpatialArc};
 use crate::interpreter::{CornerInsert, Event, Feed, Modes, Move, MoveKind};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
@@ -99,7 +100,15 @@ impl Smoother {
                 let arc = Arc::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Arc(arc), out);
             }
-            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) | MoveKind::Position(_) => {
+            MoveKind::SpatialArc(geometry) => {
+                let arc = SpatialArc::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::SpatialArc(arc), out);
+            }
+            MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => {
+                let curve = PolynomialCurve::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::Polynomial(curve), out);
+            }
+            MoveKind::Position(_) => {
                 let line = Line::new(self.position, next.end, linear);
                 self.push_motion(next, Curve::Line(line), out);
             }
@@ -344,7 +353,7 @@ impl Held {
 impl Head {
     fn piece(self, kind: PieceKind, stop_at_end: bool) -> ContourPiece {
         let Self { block, feed, modes, events, blocks_begun } = self;
-        ContourPiece { block, kind, feed, modes, events, blocks_begun, stop_at_end }
+        ContourPiece { block, kind, feed, modes, events, blocks_begun, block_length_lu: None, stop_at_end }
     }
 }
 

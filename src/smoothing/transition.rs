@@ -153,7 +153,9 @@ pub(super) fn per_axis(
         if turn > 0.0 { (axis_lu[axis] / (MIDDLE_RATIO * turn)).min(t_max_lu) } else { 0.0 }
     });
     let t_lu = reach.as_slice().iter().fold(0.0_f64, |most, t_lu| most.max(*t_lu));
-    if !(t_lu > 0.0 && t_lu.is_finite()) {
+    // An axis that turns and must not deviate leaves a corner.
+    let stuck = turn.as_slice().iter().zip(reach.as_slice()).any(|(turn, t_lu)| *turn != 0.0 && !(*t_lu > 0.0));
+    if stuck || !(t_lu > 0.0 && t_lu.is_finite()) {
         return None;
     }
     let mut places: Vec<f64> = reach.as_slice().iter().flat_map(|t_lu| [-*t_lu, *t_lu]).collect();
