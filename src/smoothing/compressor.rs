@@ -247,7 +247,8 @@ impl Run {
         } else {
             let share = self.tolerances.share(&moved, linear);
             let factor = if share > MOVED_SHARE { MOVED_SHARE / share } else { 1.0 };
-            PartPoint(programmed.0 + moved * factor)
+            // Points at the same place but for rounding have no fit.
+            if share.is_finite() { PartPoint(programmed.0 + moved * factor) } else { programmed }
         };
         Some(Node { position, first, second })
     }

@@ -15,9 +15,9 @@
 //! Does not choose the feed, and does not round the corners of a chamfer: those are corners like any other.
 
 use super::smoother::Held;
-use crate::base::{AxisId, PerAxis};
-use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
-use crate::interpreter::{ArcGeometry, CornerInsert, CornerShape};
+use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
+use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, SpatialArc};
+use crate::interpreter::{ArcGeometry, CornerInsert, CornerShape, SpatialArcGeometry};
 use std::f64::consts::TAU;
 
 /// Turning angles below this, and those that near a reversal, are no corners.
@@ -25,6 +25,9 @@ const ANGLE_MIN_RAD: f64 = 1e-3;
 
 /// Rounds of bisection for the largest radius that fits, and for the length of a chamfer on arcs.
 const BISECTIONS: usize = 60;
+
+/// Directions whose share in the plane differs from 1 by more are not parallel to it.
+const PARALLEL_RATIO: f64 = 1e-9;
 
 /// Share of the plane in the direction of a block below which it does not move in the plane.
 const PLANE_MIN_RATIO: f64 = 1e-9;
@@ -88,10 +91,10 @@ pub(super) fn inserted(
     linear: &PerAxis<bool>,
 ) -> Result<Inserted, Omitted> {
     let share = if corner_follows { 0.5 } else { 1.0 };
-    let corner = before.curve.end().0;
-    let corner = insert.plane.map(|axis| corner[axis]);
-    let first = Side::new(&before.curve, insert.plane, before.curve.length_lu() - before.head_lu, true)?;
-    let second = Side::new(&after.curve, insert.plane, share * after.curve.length_lu(), false)?;
+    let plane = Basis::new(insert);
+    let corner = plane.projected(&before.curve.end().0);
+    let first = Side::new(&before.curve, &plane, before.curve.length_lu() - before.head_lu, true)?;
+    let second = Side::new(&after.curve, &plane, share * after.curve.length_lu(), false)?;
     let (u, v) = (first.tangent, second.tangent);
     let turn_rad = cross(u, v).atan2(dot(u, v));
     if turn_rad.abs() < ANGLE_MIN_RAD {
@@ -100,7 +103,7 @@ pub(super) fn inserted(
     if turn_rad.abs() > std::f64::consts::PI - ANGLE_MIN_RAD {
         return Err(Omitted::Shape);
     }
-    let sides = Sides { first, second, corner, sense: turn_rad.signum(), turn_rad, plane: insert.plane };
+    let sides = Sides { first, second, corner, sense: turn_rad.signum(), turn_rad, plane };
     match insert.shape {
         CornerShape::Fillet { radius_mm } => sides.fillet(radius_mm, linear),
         CornerShape::ChamferLeg { length_mm } => sides.chamfer(length_mm, false, linear),
@@ -108,23 +111,84 @@ pub(super) fn inserted(
     }
 }
 
+/// The plane: of two axes, or tilted.
+struct Basis {
+    axes: [AxisId; 2],
+    tilted: bool,
+    directions: [AxisVector; 2],
+}
+
+impl Basis {
+    fn new(insert: &CornerInsert) -> Self {
+        let along = |axis: AxisId| PerAxis::from_fn(|other| f64::from(u8::from(other == axis)));
+        let directions = insert.directions.unwrap_or(insert.plane.map(along));
+        Self { axes: insert.plane, tilted: insert.directions.is_some(), directions }
+    }
+
+    fn projected(&self, vector: &AxisVector) -> Point {
+        self.directions.map(|direction| direction.dot(vector))
+    }
+
+    /// A circle, if it lies in the plane or parallel to it.
+    fn circle(&self, curve: &Curve) -> Option<Kind> {
+        match curve {
+            Curve::Arc(arc) if !self.tilted && arc.plane() == self.axes => Some(Kind::Circle {
+                centre_mm: arc.centre_mm(),
+                radius_mm: arc.radius_mm(),
+                sense: arc.sweep_rad().signum(),
+                turn_rate_per_mm: arc.turn_rate_per_mm().abs(),
+            }),
+            Curve::SpatialArc(arc) => {
+                let own = arc.directions();
+                let [first, second] = own.map(|direction| self.projected(&direction));
+                let outside = |flat: Point| (dot(flat, flat) - 1.0).abs() > PARALLEL_RATIO;
+                if outside(first) || outside(second) {
+                    return None;
+                }
+                let (sin, cos) = arc.angles_rad()[0].sin_cos();
+                let radius_mm = arc.radius_mm();
+                let centre = arc.start().0 - (own[0] * cos + own[1] * sin) * radius_mm;
+                Some(Kind::Circle {
+                    centre_mm: self.projected(&centre),
+                    radius_mm,
+                    sense: (cross(first, second) * arc.turn_rate_per_mm()).signum(),
+                    turn_rate_per_mm: arc.turn_rate_per_mm().abs(),
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// The fillet as a curve.
+    fn arc(
+        &self,
+        [start, end]: [PartPoint; 2],
+        centre_mm: Point,
+        radius_mm: f64,
+        sweep_rad: f64,
+        linear: &PerAxis<bool>,
+    ) -> Curve {
+        if !self.tilted {
+            let geometry = ArcGeometry { plane: self.axes, centre_mm, radius_mm, sweep_rad };
+            return Curve::Arc(Arc::new(start, end, &geometry, linear));
+        }
+        let centre_mm = self.directions[0] * centre_mm[0] + self.directions[1] * centre_mm[1];
+        let geometry = SpatialArcGeometry { directions: self.directions, centre_mm, radius_mm, sweep_rad };
+        Curve::SpatialArc(SpatialArc::new(start, end, &geometry, linear))
+    }
+}
+
 impl<'a> Side<'a> {
-    fn new(curve: &'a Curve, plane: [AxisId; 2], free_lu: f64, leads_to: bool) -> Result<Self, Omitted> {
+    fn new(curve: &'a Curve, plane: &Basis, free_lu: f64, leads_to: bool) -> Result<Self, Omitted> {
         let state = curve.at(if leads_to { f64::INFINITY } else { 0.0 });
-        let projected = plane.map(|axis| state.first[axis]);
+        let projected = plane.projected(&state.first);
         let plane_ratio = projected[0].hypot(projected[1]);
         if curve.rotary_only() || !(plane_ratio > PLANE_MIN_RATIO) {
             return Err(Omitted::Shape);
         }
         let kind = match curve {
             Curve::Line(_) => Kind::Straight { plane_ratio },
-            Curve::Arc(arc) if arc.plane() == plane => Kind::Circle {
-                centre_mm: arc.centre_mm(),
-                radius_mm: arc.radius_mm(),
-                sense: arc.sweep_rad().signum(),
-                turn_rate_per_mm: arc.turn_rate_per_mm().abs(),
-            },
-            _ => return Err(Omitted::Shape),
+            other => plane.circle(other).ok_or(Omitted::Shape)?,
         };
         Ok(Self { curve, tangent: projected.map(|component| component / plane_ratio), kind, free_lu, leads_to })
     }
@@ -177,7 +241,7 @@ struct Sides<'a> {
     /// Of the fillet: 1 turns from the first axis of the plane to the second.
     sense: f64,
     turn_rad: f64,
-    plane: [AxisId; 2],
+    plane: Basis,
 }
 
 impl Sides<'_> {
@@ -191,12 +255,12 @@ impl Sides<'_> {
         let (centre_mm, [tail_lu, head_lu]) = found;
         let start = self.first.curve.trimmed(0.0, self.first.place_lu(tail_lu)).end();
         let end = self.second.curve.trimmed(self.second.place_lu(head_lu), f64::INFINITY).start();
-        let angle = |point: &crate::base::PartPoint| {
-            (point.0[self.plane[1]] - centre_mm[1]).atan2(point.0[self.plane[0]] - centre_mm[0])
+        let angle = |point: &PartPoint| {
+            let [x, y] = minus(self.plane.projected(&point.0), centre_mm);
+            y.atan2(x)
         };
         let sweep_rad = self.sense * (self.sense * (angle(&end) - angle(&start))).rem_euclid(TAU);
-        let geometry = ArcGeometry { plane: self.plane, centre_mm, radius_mm, sweep_rad };
-        let curve = Curve::Arc(Arc::new(start, end, &geometry, linear));
+        let curve = self.plane.arc([start, end], centre_mm, radius_mm, sweep_rad, linear);
         self.checked(curve, [tail_lu, head_lu], reduced)
     }
 

@@ -197,7 +197,14 @@ impl Smoother {
         if reduced {
             self.unrounded.report(Reason::SmallInsert, block);
         }
-        let feed = insert.feed_mm_s.map_or_else(|| after.head.feed.clone(), |feed_lu_s| Feed::Path { feed_lu_s });
+        let feed = match (insert.feed_mm_s, &after.head.feed) {
+            (Some(feed_lu_s), _) => Feed::Path { feed_lu_s },
+            // The feed with which the block begins.
+            (None, Feed::Varying { feeds_lu_s }) => {
+                feeds_lu_s.first().map_or(Feed::Rapid, |first| Feed::Path { feed_lu_s: *first })
+            }
+            (None, feed) => feed.clone(),
+        };
         let modes = before.head.modes.clone();
         let mut head = Head { block, feed, modes, events: Vec::new(), blocks_begun: 0 };
         let left_lu = before.curve.length_lu() - tail_lu;

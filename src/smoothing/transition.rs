@@ -63,9 +63,16 @@ pub(super) struct Pair<'a> {
 impl Tolerances {
     /// Greatest share of a tolerance that a deviation takes.
     pub(super) fn share(&self, deviation: &AxisVector, linear: &PerAxis<bool>) -> f64 {
-        let together = deviation.masked(linear).norm() / self.contour_mm;
-        let alone = deviation.as_slice().iter().zip(self.axis_lu.as_slice()).map(|(d, tolerance)| d.abs() / tolerance);
-        alone.fold(together, f64::max)
+        // No deviation is none, also of a tolerance of 0; a NaN must not pass for small.
+        let taken = |deviation: f64, tolerance: f64| if deviation == 0.0 { 0.0 } else { deviation.abs() / tolerance };
+        let together = taken(deviation.masked(linear).norm(), self.contour_mm);
+        let each = deviation.as_slice().iter().zip(self.axis_lu.as_slice());
+        let alone = each.map(|(deviation, tolerance)| taken(*deviation, *tolerance));
+        let greater = |most: f64, share: f64| match share.is_nan() {
+            true => f64::INFINITY,
+            false => most.max(share),
+        };
+        alone.fold(greater(0.0, together), greater)
     }
 }
 
@@ -94,8 +101,7 @@ impl Pair<'_> {
             let u = 2.0 * t_lu * i as f64 / SAMPLES as f64;
             let deviation = value(&polynomial, u) - self.programmed(u - t_lu);
             let share = tolerances.share(&deviation, self.linear);
-            // A NaN must not pass for small.
-            greatest = if share.is_nan() { f64::INFINITY } else { greatest.max(share) };
+            greatest = greatest.max(share);
         }
         greatest
     }

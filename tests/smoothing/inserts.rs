@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 const Z: AxisId = AxisId::new(2);
 
 fn with_corner(mut moved: Move, shape: CornerShape) -> Move {
-    moved.corner = Some(Box::new(CornerInsert { shape, plane: [X, Y], feed_mm_s: None }));
+    moved.corner = Some(Box::new(CornerInsert { shape, plane: [X, Y], directions: None, feed_mm_s: None }));
     moved
 }
 
@@ -68,7 +68,7 @@ fn a_fillet_between_lines_is_the_arc_that_touches_both() {
 #[test]
 fn frc_is_the_feed_of_the_corner() {
     let mut moves = g64(&[vec![10.0, 0.0], vec![10.0, 10.0]]);
-    let insert = CornerInsert { shape: fillet(1.0), plane: [X, Y], feed_mm_s: Some(3.0) };
+    let insert = CornerInsert { shape: fillet(1.0), plane: [X, Y], directions: None, feed_mm_s: Some(3.0) };
     moves[0].corner = Some(Box::new(insert));
     assert_eq!(contour(&moves)[1].feed, Feed::Path { feed_lu_s: 3.0 });
 }
@@ -153,6 +153,28 @@ fn other_axes_go_linearly_through_a_fillet() {
     close(arc.end().0[Z], 4.0, 1e-12, "end");
     close(arc.at(arc.length_lu() / 2.0).position.0[Z], 4.0, 1e-12, "middle");
     assert_eq!(curves(&pieces)[0].end(), arc.start());
+}
+
+#[test]
+fn a_fillet_in_a_tilted_plane_is_a_circle_of_that_plane() {
+    // The XY plane turned by 0.7 rad about Y.
+    let (sin, cos) = f64::sin_cos(0.7);
+    let directions = [vector(&[cos, 0.0, -sin]), vector(&[0.0, 1.0])];
+    let place = |x: f64, y: f64| (directions[0] * x + directions[1] * y).as_slice()[..3].to_vec();
+    let mut moves = g64(&[place(10.0, 0.0), place(10.0, 10.0), place(30.0, 10.0)]);
+    for moved in &mut moves[..2] {
+        let insert = CornerInsert { shape: fillet(2.0), plane: [X, Y], directions: Some(directions), feed_mm_s: None };
+        moved.corner = Some(Box::new(insert));
+    }
+    let pieces = contour(&moves);
+    assert_tangential(&pieces);
+    for (index, centre) in [(1, place(8.0, 2.0)), (3, place(12.0, 8.0))] {
+        let Curve::SpatialArc(arc) = curves(&pieces)[index] else { panic!("{pieces:?}") };
+        close(arc.length_lu(), PI, 1e-9, "a quarter of a circle of 2 mm");
+        for q in samples(curves(&pieces)[index]) {
+            close((q - vector(&centre)).norm(), 2.0, 1e-9, "distance from the centre");
+        }
+    }
 }
 
 #[test]

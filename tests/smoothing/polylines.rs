@@ -295,7 +295,7 @@ fn degenerate_moves_never_panic() {
                 m.modes.path_mode = [G641, G642, G643, G644, G645][(pick().abs() as usize) % 5];
                 if pick() > 1.0 {
                     let shape = CornerShape::Fillet { radius_mm: pick().abs() };
-                    m.corner = Some(Box::new(CornerInsert { shape, plane: [X, Y], feed_mm_s: None }));
+                    m.corner = Some(Box::new(CornerInsert { shape, plane: [X, Y], directions: None, feed_mm_s: None }));
                 }
                 m.modes.compressor = if pick() > 1.0 { Compressor::Cad } else { Compressor::Off };
                 if pick() > 1.0 {
