@@ -25,7 +25,7 @@ const UNBOUND_RATIO: f64 = 1.5;
 
 /// Intervals between two nodes of the curve to begin with, and how often one may be cut.
 const INTERVALS: usize = 4;
-const CUTS_MAX: u32 = 10;
+const CUTS_MAX: u32 = 16;
 
 /// Places of one scan; where a curve asks for more, the rest stays coarse.
 const PLACES_MAX: usize = 5000;

@@ -154,27 +154,32 @@ fn stretches(rules: &AxisRules, path: &JointPath, scan: &Scan) -> Vec<Stretch> {
     stretches
 }
 
-/// The border that pays least: index of the stretch before it; `None` if all pay.
+/// The border to take away: index of the stretch before it; `None` if all pay. Of the stretch with the least room either it becomes as
+/// slow as a slower neighbour, or a faster neighbour becomes as slow as it is: what costs less time.
 fn tightest(stretches: &[Stretch], scan: &Scan, way_lu: &impl Fn(&Stretch, &Stretch) -> f64) -> Option<usize> {
     let mut least = (ROOM_RATIO, None);
     for (i, stretch) in stretches.iter().enumerate() {
-        let lower = |other: Option<&Stretch>| other.filter(|other| other.speed_lu_s < stretch.speed_lu_s).copied();
-        let before = lower(i.checked_sub(1).and_then(|before| stretches.get(before)));
-        let after = lower(stretches.get(i + 1));
-        let needed_lu: f64 = [before, after].iter().flatten().map(|other| way_lu(other, stretch)).sum();
-        if needed_lu == 0.0 {
-            continue;
-        }
-        let places = scan.places();
-        let room = (places[stretch.last].s_lu - places[stretch.first].s_lu) / needed_lu;
+        let neighbours = [i.checked_sub(1), Some(i + 1)].into_iter().flatten().filter_map(|k| stretches.get(k));
+        let slower = neighbours.filter(|other| other.speed_lu_s < stretch.speed_lu_s);
+        let needed_lu: f64 = slower.map(|other| way_lu(other, stretch)).sum();
+        let room = length_lu(stretch, scan) / needed_lu;
+        // Without a slower neighbour the room is infinite.
         if room < least.0 {
-            // Towards the faster one of two slower neighbours.
-            let to_before = match (before, after) {
-                (Some(before), Some(after)) => before.speed_lu_s >= after.speed_lu_s,
-                (before, _) => before.is_some(),
-            };
-            least = (room, Some(if to_before { i - 1 } else { i }));
+            least = (room, Some(i));
         }
     }
-    least.1
+    let tight = least.1?;
+    let cost_s = |before: usize| {
+        let (a, b) = (stretches.get(before)?, stretches.get(before + 1)?);
+        let (slow, fast) = if a.speed_lu_s < b.speed_lu_s { (a, b) } else { (b, a) };
+        Some(length_lu(fast, scan) * (1.0 / slow.speed_lu_s - 1.0 / fast.speed_lu_s))
+    };
+    let borders = [tight.checked_sub(1), Some(tight)].into_iter().flatten();
+    let costs = borders.filter_map(|before| Some((before, cost_s(before)?)));
+    costs.reduce(|a, b| if b.1 < a.1 { b } else { a }).map(|(before, _)| before)
+}
+
+fn length_lu(stretch: &Stretch, scan: &Scan) -> f64 {
+    let places = scan.places();
+    places[stretch.last].s_lu - places[stretch.first].s_lu
 }

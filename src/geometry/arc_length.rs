@@ -37,6 +37,9 @@ const BISECTIONS: u32 = 64;
 /// Rounds of Newton's method with a bracket that is halved at least every second one.
 const INVERSION_ROUNDS: u32 = 100;
 
+/// A step of Newton's method as share of the panel after which no further one is needed.
+const SETTLED_RATIO: f64 = 1e-9;
+
 /// A stretch of the parameter of one piece.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Panel {
@@ -161,15 +164,15 @@ impl ArcLengthTable {
             }
             let newton = error_lu / self.speed(piece, u);
             let mut next = u - newton;
+            if newton.abs() <= SETTLED_RATIO * (u1 - u0) {
+                // Newton squares the error: this step leaves nothing to see.
+                return next.max(u0).min(u1);
+            }
             if !(next > low && next < high && newton.abs() < 0.5 * step_before) {
                 next = 0.5 * (low + high);
             }
             step_before = (next - u).abs();
             u = next;
-            // Newton squares the error: this step leaves nothing to see.
-            if step_before <= 1e-9 * (u1 - u0) && newton.abs() <= 1e-9 * (u1 - u0) || high - low <= f64::EPSILON * u1 {
-                break;
-            }
         }
         u
     }
@@ -194,6 +197,9 @@ impl ArcLengthTable {
         let end = piece.parameter_end_ratio;
         if !(total_lu.is_finite() && end > 0.0) {
             return None;
+        }
+        if total_lu < DISPLACEMENT_MIN_LU {
+            return Some(Vec::new());
         }
         if rough_lu < DISPLACEMENT_MIN_LU {
             // Shorter than any motion. Where other axes move meanwhile, they would jump.

@@ -20,7 +20,7 @@ const MOVES_MAX: u64 = 20_000_000;
 
 /// All diagnostics of `source` on `machine`.
 pub fn check(setup: impl Into<Setup>, machine: &Machine) -> Vec<Diagnostic> {
-    let setup = setup.into();
+    let setup = Setup { lists_only: true, ..setup.into() };
     let source = &setup.program;
     let mut found = every_line(source, &Dialect::new(machine));
     let is_sound = found.is_empty();

@@ -276,6 +276,12 @@ impl Interpreter {
         self.warned.insert(word_or_code)
     }
 
+    /// Puts an error on the list that does not end the program.
+    pub(super) fn report(&mut self, fault: Fault) {
+        let diagnostic = self.diagnostic(fault);
+        self.warnings.push(diagnostic);
+    }
+
     /// Puts a finding on the list of warnings.
     pub(super) fn warn(&mut self, fault: Fault) {
         let mut diagnostic = self.diagnostic(fault);

@@ -132,6 +132,8 @@ impl ExprParser<'_, '_> {
             return Ok(parameter);
         }
         let role = words::role(name);
+        let is_call = self.lexer.peek() == Token::Symbol("(");
+        let role = role.filter(|role| is_call || !words::is_free_name(*role));
         if let Some(Role::Function(function)) = role {
             return self.call(function, name, start);
         }

@@ -77,10 +77,12 @@ fn end_of_block(mut lexer: Lexer, block: Block) -> Outcome<Block> {
         return Ok(block);
     }
     let columns = lexer.columns_of_next();
-    lexer.token()?;
+    let is_equals = lexer.token()? == Token::Symbol("=");
+    let help =
+        if is_equals { "did you mean `==`? A comparison is written so" } else { "write it into a block of its own" };
     Err(Fault::new(codes::TRAILING_TEXT, columns, "the statement ends before this")
         .label("expected the end of the block")
-        .help("write it into a block of its own"))
+        .help(help))
 }
 
 /// `/` or `/0` to `/9`.
@@ -403,7 +405,8 @@ impl<'a> WordParser<'_, 'a, '_> {
             }
             return Ok(WordKind::Address(Address::Axis(axis), self.address_value()?));
         }
-        match words::role(name) {
+        let is_call = next == Token::Symbol("(");
+        match words::role(name).filter(|role| is_call || !words::is_free_name(*role)) {
             Some(Role::Keyword(keyword)) => Ok(WordKind::Keyword(keyword)),
             Some(Role::Address(address)) => {
                 if !self.lexer.take("=") {
@@ -506,7 +509,7 @@ impl<'a> WordParser<'_, 'a, '_> {
     }
 
     fn unknown_word(&mut self, name: &str, columns: Columns) -> Box<Fault> {
-        let help = words::did_you_mean(name);
+        let help = missing_equals_sign(name).or_else(|| words::did_you_mean(name));
         let is_call = self.first && (self.lexer.peek() == Token::Symbol("(") || self.lexer.at_end());
         if is_call && help.is_none() {
             return Fault::new(
@@ -520,6 +523,14 @@ impl<'a> WordParser<'_, 'a, '_> {
             .label("not a word of the language")
             .maybe_help(help.or_else(|| (!is_call).then(|| format!("an assignment needs `=`: {name}=..."))))
     }
+}
+
+/// Help for `CR5`: an address of several letters with its number right behind it.
+fn missing_equals_sign(name: &str) -> Option<String> {
+    let address = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    let number = &name[address.len()..];
+    let is_address = !number.is_empty() && matches!(words::role(address), Some(Role::Address(_)));
+    is_address.then(|| format!("an address of several letters needs `=`: {address}={number}"))
 }
 
 /// The whole number of an address such as M or T, if the value is one and not negative.

@@ -261,7 +261,7 @@ fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
         .label("expected two letters or underscores at its start")
         .maybe_help(name.starts_with(['R', 'r']).then(|| "R parameters need no DEF".to_owned())));
     }
-    if name.len() == 1 || !matches!(words::role(name), None | Some(Role::FunctionNotBuilt(_))) {
+    if name.len() == 1 || words::role(name).is_some_and(|role| !words::is_free_name(role)) {
         return Err(Fault::new(codes::REDECLARED, columns.clone(), format!("`{name}` is a word of the language"))
             .label("expected a name of its own"));
     }

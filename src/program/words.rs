@@ -370,6 +370,28 @@ pub enum Function {
 }
 
 impl Function {
+    /// Functions whose names programs also use for variables: they are functions only before a bracket.
+    pub fn leaves_its_name(self) -> bool {
+        use Function::*;
+        matches!(
+            self,
+            ToUpper
+                | ToLower
+                | StrLen
+                | Index
+                | Rindex
+                | Mindex
+                | Substr
+                | Number
+                | IsNumber
+                | AxName
+                | AxString
+                | IsAxis
+                | IsVar
+                | Sprint
+        )
+    }
+
     /// Fewest and most arguments.
     pub fn arity(self) -> (usize, usize) {
         match self {
@@ -544,6 +566,20 @@ pub fn role(word: &str) -> Option<Role> {
     let table = table();
     let compare = |known: &str| known.bytes().cmp(word.bytes().map(|byte| byte.to_ascii_uppercase()));
     table.binary_search_by(|(known, _)| compare(known)).ok().map(|found| table[found].1)
+}
+
+/// A word with that role: the first in alphabetical order.
+pub fn spelling(wanted: Role) -> Option<&'static str> {
+    table().iter().find(|(_, role)| *role == wanted).map(|(word, _)| *word)
+}
+
+/// True for a function that is one only before a bracket.
+pub fn is_free_name(role: Role) -> bool {
+    match role {
+        Role::Function(function) => function.leaves_its_name(),
+        Role::FunctionNotBuilt(_) => true,
+        _ => false,
+    }
 }
 
 /// Every word of the table, in alphabetical order: for help texts.
