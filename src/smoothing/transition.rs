@@ -137,8 +137,8 @@ fn largest(pair: &Pair<'_>, t_max_lu: f64, tolerances: &Tolerances) -> Option<f6
             t_lu = 0.5 * (low + high);
         } else {
             high = t_lu;
-            // Deviations grow at least as T does.
-            t_lu = if low > 0.0 { 0.5 * (low + high) } else { t_lu * (1.0 / taken).max(1e-3) };
+            // Deviations grow at least as T does; a little less, so that rounding does not keep it above.
+            t_lu = if low > 0.0 { 0.5 * (low + high) } else { t_lu * (0.999 / taken).max(1e-3) };
         }
     }
     (low > 0.0).then_some(low)
