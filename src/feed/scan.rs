@@ -8,7 +8,7 @@
 //! most; [`RESERVE_RATIO`] is added for curves that are no parabola. Tests compare with a far finer sampling.
 //! Does not choose where to change the speed: that is `split`.
 
-use super::limits::AxisRules;
+use super::limits::{AxisRules, FeedCap};
 use super::worst::Worst;
 use crate::base::{AxisId, AxisVector};
 use crate::geometry::Curve;
@@ -47,15 +47,14 @@ pub(super) struct Scan {
 /// How demands are weighed: per axis, over what the axis allows for them at constant speed.
 struct Scale<'a> {
     rules: &'a AxisRules,
-    jerk_limited: bool,
-    /// Highest speed that is asked for.
-    feed_lu_s: f64,
+    /// What is programmed.
+    feed: FeedCap,
 }
 
 impl Scan {
-    /// Samples `path`, whose curve has no step in direction or curvature inside; `feed_lu_s` is what is programmed.
-    pub(super) fn new(rules: &AxisRules, path: &JointPath, feed_lu_s: f64, jerk_limited: bool) -> Self {
-        let scale = Scale { rules, jerk_limited, feed_lu_s };
+    /// Samples `path`, whose curve has no step in direction or curvature inside; `feed` is what is programmed.
+    pub(super) fn new(rules: &AxisRules, path: &JointPath, feed: FeedCap) -> Self {
+        let scale = Scale { rules, feed };
         let length_lu = path.length_lu();
         let nodes: Vec<f64> = match path.contour.curve() {
             Some(Curve::Polynomial(curve)) => curve.nodes_lu().collect(),
@@ -97,9 +96,9 @@ impl Scan {
         Worst::new(d1 * RESERVE_RATIO, d2 * RESERVE_RATIO, d3 * RESERVE_RATIO)
     }
 
-    /// Highest constant speed at each place, `feed_lu_s` where nothing else binds.
-    pub(super) fn speeds_lu_s(&self, rules: &AxisRules, feed_lu_s: f64, jerk_limited: bool) -> Vec<f64> {
-        let scale = Scale { rules, jerk_limited, feed_lu_s };
+    /// Highest constant speed at each place, the feed where nothing else binds.
+    pub(super) fn speeds_lu_s(&self, rules: &AxisRules, feed: FeedCap) -> Vec<f64> {
+        let scale = Scale { rules, feed };
         self.places.iter().map(|place| scale.speed_lu_s(&place.state)).collect()
     }
 }
@@ -128,7 +127,7 @@ impl Scale<'_> {
         let limits = &self.rules.axes[axis.index()];
         let second = state.second[axis] / (self.rules.radial_acceleration_share * limits.acceleration_max_lu_s2);
         let third = state.third[axis] / (self.rules.radial_jerk_share * limits.jerk_max_lu_s3);
-        [second, if self.jerk_limited { third } else { 0.0 }]
+        [second, if self.rules.jerk_limited { third } else { 0.0 }]
     }
 
     /// The middle is what is between its neighbours.
@@ -148,8 +147,7 @@ impl Scale<'_> {
 
     /// Highest speed without regard to the bend.
     fn driven_lu_s(&self, state: &JointState) -> f64 {
-        let velocity = self.rules.largest(|axis, limits| state.first[axis].abs() / limits.velocity_max_lu_s);
-        self.feed_lu_s.min(1.0 / velocity.demand_ratio)
+        self.rules.driven(self.feed, |axis| state.first[axis].abs()).velocity_lu_s
     }
 
     fn speed_lu_s(&self, state: &JointState) -> f64 {

@@ -8,13 +8,11 @@
 //! until on each part that is faster than a neighbour there is room for the change.
 //! Does not plan the speed.
 
-use super::limits::{AxisRules, PieceLimits};
+use super::limits::{AxisRules, FeedCap, PieceLimits};
 use super::scan::Scan;
 use super::worst::Worst;
 use crate::geometry::Curve;
-use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
-use crate::machine::AccelerationMode;
 use crate::smoothing::{ContourPiece, PieceKind};
 
 /// Speeds of neighbouring stretches that differ by less than this factor are one.
@@ -85,19 +83,11 @@ fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part
 }
 
 fn scan(rules: &AxisRules, path: &JointPath) -> Scan {
-    Scan::new(rules, path, feed_lu_s(&path.contour), jerk_limited(&path.contour))
+    Scan::new(rules, path, feed_of(rules, &path.contour))
 }
 
-fn jerk_limited(contour: &ContourPiece) -> bool {
-    contour.modes.acceleration_mode == AccelerationMode::Soft
-}
-
-fn feed_lu_s(contour: &ContourPiece) -> f64 {
-    match &contour.feed {
-        Feed::Rapid => f64::INFINITY,
-        Feed::Path { feed_lu_s } => *feed_lu_s,
-        Feed::Varying { feeds_lu_s } => feeds_lu_s.iter().copied().fold(f64::INFINITY, f64::min),
-    }
+fn feed_of(rules: &AxisRules, contour: &ContourPiece) -> FeedCap {
+    contour.curve().map_or(FeedCap::Rapid, |curve| rules.feed_cap(&contour.feed, curve))
 }
 
 /// The stretch of a piece as a piece.
@@ -124,7 +114,7 @@ fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
 /// Stretches of about equal speed that are long enough to change it.
 fn stretches(rules: &AxisRules, path: &JointPath, scan: &Scan) -> Vec<Stretch> {
     let last = scan.places().len().saturating_sub(1);
-    let speeds = scan.speeds_lu_s(rules, feed_lu_s(&path.contour), jerk_limited(&path.contour));
+    let speeds = scan.speeds_lu_s(rules, feed_of(rules, &path.contour));
     let lowest_lu_s = speeds.iter().copied().fold(f64::INFINITY, f64::min);
     let highest_lu_s = speeds.iter().copied().fold(0.0, f64::max);
     let whole = Stretch { first: 0, last, speed_lu_s: lowest_lu_s };
@@ -143,7 +133,7 @@ fn stretches(rules: &AxisRules, path: &JointPath, scan: &Scan) -> Vec<Stretch> {
             _ => stretches.push(Stretch { first: i, last: i + 1, speed_lu_s }),
         }
     }
-    let dynamics = PieceLimits::rough_dynamics(rules, &scan.worst(0, last), jerk_limited(&path.contour));
+    let dynamics = PieceLimits::rough_dynamics(rules, &scan.worst(0, last));
     let way_lu = |from: &Stretch, to: &Stretch| dynamics.ramp_length_lu(from.speed_lu_s, to.speed_lu_s);
     while let Some(tightest) = tightest(&stretches, scan, &way_lu) {
         let gone = stretches.remove(tightest + 1);

@@ -104,6 +104,7 @@ impl Rules {
             if mode != PathMode::G645
                 || (smooth(before.curve) && smooth(after.curve))
                 || !(step > CURVATURE_STEP_MIN_PER_MM)
+                || before.curve.end() != after.curve.start()
             {
                 return Junction::Pass;
             }
@@ -122,7 +123,10 @@ impl Rules {
             _ => None,
         };
         let linear_only = lines.filter(|lines| !lines.iter().any(|line| self.moves_rotary(line)));
+        // An axis that POSA has sent elsewhere is on its way: no polynomial can follow it.
+        let apart = before.curve.end() != after.curve.start();
         let joined = match (mode, lines, linear_only) {
+            (PathMode::G643 | PathMode::G644, ..) | (_, _, None) if apart => Some(Junction::Pass),
             (PathMode::G643, Some(lines), _) => self.block_internal(lines, before, after, angle_rad, &room),
             (PathMode::G644, ..) => {
                 let tolerances = self.machine_tolerances();

@@ -91,6 +91,10 @@ pub(super) fn inserted(
     linear: &PerAxis<bool>,
 ) -> Result<Inserted, Omitted> {
     let share = if corner_follows { 0.5 } else { 1.0 };
+    // An axis that POSA has sent elsewhere is on its way.
+    if before.curve.end() != after.curve.start() {
+        return Err(Omitted::Shape);
+    }
     let plane = Basis::new(insert);
     let corner = plane.projected(&before.curve.end().0);
     let first = Side::new(&before.curve, &plane, before.curve.length_lu() - before.head_lu, true)?;

@@ -17,9 +17,9 @@ use super::insert::{Inserted, Omitted, inserted};
 use super::unrounded::{Reason, Unrounded};
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
-use crate::base::{Diagnostic, PartPoint};
+use crate::base::{Diagnostic, PartPoint, PerAxis};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, PolynomialCurve, SpatialArc};
-use crate::interpreter::{CornerInsert, Event, Feed, Modes, Move, MoveKind};
+use crate::interpreter::{AxisPositioning, CornerInsert, Event, Feed, Modes, Move, MoveKind, Positioning};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 
@@ -36,6 +36,8 @@ pub struct Smoother {
     /// case that no piece follows.
     carried: Option<Head>,
     unrounded: Unrounded,
+    /// Axes that POSA has sent away: the program ends when they have arrived.
+    positioned: PerAxis<bool>,
 }
 
 /// The motion block whose end is not decided yet.
@@ -84,6 +86,7 @@ impl Smoother {
             held: None,
             carried: None,
             unrounded: Unrounded::default(),
+            positioned: PerAxis::splat(false),
         }
     }
 
@@ -108,15 +111,21 @@ impl Smoother {
                 let curve = PolynomialCurve::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Polynomial(curve), out);
             }
-            MoveKind::Position(_) => {
-                let line = Line::new(self.position, next.end, linear);
-                self.push_motion(next, Curve::Line(line), out);
-            }
             MoveKind::Dwell { time_s } => {
                 let time_s = *time_s;
                 self.push_wait(next, time_s, out);
             }
-            MoveKind::WaitPositioned(_) | MoveKind::StopPreparation => self.push_wait(next, 0.0, out),
+            MoveKind::Position(axes) => {
+                let axes = axes.clone();
+                self.push_positioning(next, axes);
+            }
+            MoveKind::WaitPositioned(axes) => {
+                let axes = *axes;
+                self.rest(out);
+                let head = self.head(next, 0);
+                out(self.wait_positioned(head, axes));
+            }
+            MoveKind::StopPreparation => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: true } => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: false } => self.carry(next, 0),
         }
@@ -124,10 +133,39 @@ impl Smoother {
 
     /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
     pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        self.end_stages(out);
+        let last = self.held.as_ref().map(|held| Head { events: Vec::new(), blocks_begun: 0, ..held.head.clone() });
         self.rest(out);
-        if let Some(carried) = self.carried.take() {
-            out(self.wait(carried, 0.0));
+        let carried = self.carried.take();
+        let waits = self.positioned.as_slice().contains(&true);
+        match carried.or(last.filter(|_| waits)) {
+            Some(head) if waits => {
+                let positioned = self.positioned;
+                out(self.wait_positioned(head, positioned));
+            }
+            Some(head) => out(self.wait(head, 0.0)),
+            None => {}
         }
+    }
+
+    /// The path goes on where the axes will arrive: what is missing on the way is added to the path by feed and interpolator.
+    fn push_positioning(&mut self, next: Move, axes: std::sync::Arc<[AxisPositioning]>) {
+        for axis in axes.iter() {
+            self.positioned[axis.axis] = true;
+            self.position.0[axis.axis] = axis.end_lu;
+        }
+        let programmed = next.modes.programmed.clone();
+        let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
+        let mut events = next.events.clone();
+        events.push(start);
+        self.carry(Move { events, ..next }, 1);
+    }
+
+    fn wait_positioned(&mut self, head: Head, axes: PerAxis<bool>) -> ContourPiece {
+        for (positioned, waits) in self.positioned.as_mut_slice().iter_mut().zip(axes.as_slice()) {
+            *positioned &= !waits;
+        }
+        head.piece(PieceKind::WaitPositioned { axes, at: self.position }, true)
     }
 
     /// Findings since the last call.
@@ -289,11 +327,16 @@ impl Smoother {
         }
     }
 
-    /// Ends the motion here.
-    fn rest(&mut self, out: &mut impl FnMut(ContourPiece)) {
+    /// Hands over what waits for a corner or for the compressor.
+    fn end_stages(&mut self, out: &mut impl FnMut(ContourPiece)) {
         self.leave_corner(out);
         self.compression.flush(&self.rules);
         self.link_compressed(out);
+    }
+
+    /// Ends the motion here.
+    fn rest(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        self.end_stages(out);
         if let Some(held) = self.held.take() {
             out(held.whole(true));
         }
@@ -323,7 +366,10 @@ impl Smoother {
         let Move { block, feed, modes, mut events, .. } = next;
         let mut blocks_begun = blocks;
         if let Some(mut carried) = self.carried.take() {
-            blocks_begun += carried.blocks_begun;
+            // Words of one block may make several moves: they count as one.
+            let shared = carried.block.number == block.number && carried.block.program == block.program;
+            blocks_begun =
+                if shared { blocks_begun.max(carried.blocks_begun) } else { blocks_begun + carried.blocks_begun };
             carried.events.append(&mut events);
             events = carried.events;
         }

@@ -71,6 +71,7 @@ pub fn kinds(pieces: &[ContourPiece]) -> String {
     pieces
         .iter()
         .map(|piece| match (&piece.kind, piece.stop_at_end) {
+            (PieceKind::WaitPositioned { .. }, _) => "p",
             (PieceKind::Block(_), false) => "l",
             (PieceKind::Block(_), true) => "l|",
             (PieceKind::Blend(..), false) => "b",
