@@ -12,7 +12,10 @@ mod planner;
 mod positioning;
 pub mod profile;
 pub mod ramp;
+mod scan;
+mod split;
 mod wire;
+mod worst;
 
 pub use planner::Planner;
 pub use wire::*;
