@@ -31,6 +31,8 @@ pub struct Smoother {
     unrounded: Unrounded,
     /// Axes that POSA has sent away: the program ends when they have arrived.
     positioned: PerAxis<bool>,
+    /// The block that did so last: what the wait at the end belongs to where nothing else is left.
+    sent_away: Option<Head>,
 }
 
 /// The motion block whose end is not decided yet.
@@ -66,6 +68,7 @@ impl Smoother {
             carried: None,
             unrounded: Unrounded::default(),
             positioned: PerAxis::splat(false),
+            sent_away: None,
         }
     }
 
@@ -112,17 +115,12 @@ impl Smoother {
 
     /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
     pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
-        let last = self.held.as_ref().map(|held| Head { events: Vec::new(), blocks_begun: 0, ..held.head.clone() });
         self.rest(out);
         let carried = self.carried.take();
-        let waits = self.positioned.as_slice().contains(&true);
-        match carried.or(last.filter(|_| waits)) {
-            Some(head) if waits => {
-                let positioned = self.positioned;
-                out(self.wait_positioned(head, positioned));
-            }
-            Some(head) => out(self.wait(head, 0.0)),
-            None => {}
+        let positioned = self.positioned;
+        match self.sent_away.take().filter(|_| positioned.as_slice().contains(&true)) {
+            Some(sent_away) => out(self.wait_positioned(carried.unwrap_or(sent_away), positioned)),
+            None => carried.into_iter().for_each(|head| out(self.wait(head, 0.0))),
         }
     }
 
@@ -132,6 +130,9 @@ impl Smoother {
             self.positioned[axis.axis] = true;
             self.position.0[axis.axis] = axis.end_lu;
         }
+        let Move { block, feed, modes, .. } = &next;
+        let (feed, modes) = (feed.clone(), modes.clone());
+        self.sent_away = Some(Head { block: *block, feed, modes, events: Vec::new(), blocks_begun: 0 });
         let programmed = next.modes.programmed.clone();
         let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
         let mut events = next.events.clone();
