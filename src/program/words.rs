@@ -242,6 +242,8 @@ pub enum Suppression {
 /// NAME[axis]=value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IndexedAddress {
+    /// AX: an axis word whose axis is computed.
+    Axis,
     /// ACC.
     Acceleration,
     /// VELOLIM.
@@ -399,8 +401,8 @@ impl Function {
             Self::Substr => (2, 3),
             Self::Bound => (3, 3),
             Self::Sprint => (1, 11),
-            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (2, 16),
-            Self::Cmirror => (1, 8),
+            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (0, 16),
+            Self::Cmirror => (0, 8),
             _ => (1, 1),
         }
     }
@@ -665,6 +667,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("COMPCURV", Role::Keyword(Keyword::Compressor(Compressor::Curvature))),
     ("COMPCAD", Role::Keyword(Keyword::Compressor(Compressor::Cad))),
     ("COMPSURF", Role::Keyword(Keyword::Compressor(Compressor::Surface))),
+    ("AX", Role::Indexed(IndexedAddress::Axis)),
     ("ACC", Role::Indexed(IndexedAddress::Acceleration)),
     ("VELOLIM", Role::Indexed(IndexedAddress::Velocity)),
     ("JERKLIM", Role::Indexed(IndexedAddress::Jerk)),
