@@ -14,7 +14,7 @@ use super::unrounded::Unrounded;
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, PartPoint, PerAxis};
-use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
+use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, PolynomialCurve, SpatialArc};
 use crate::interpreter::{AxisPositioning, Event, Feed, Modes, Move, MoveKind, Positioning};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
@@ -89,9 +89,13 @@ impl Smoother {
                 let arc = Arc::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Arc(arc), out);
             }
-            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
-                let line = Line::new(self.position, next.end, linear);
-                self.push_motion(next, Curve::Line(line), out);
+            MoveKind::SpatialArc(geometry) => {
+                let arc = SpatialArc::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::SpatialArc(arc), out);
+            }
+            MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => {
+                let curve = PolynomialCurve::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::Polynomial(curve), out);
             }
             MoveKind::Dwell { time_s } => {
                 let time_s = *time_s;
@@ -293,7 +297,7 @@ impl Held {
 impl Head {
     fn piece(self, kind: PieceKind, stop_at_end: bool) -> ContourPiece {
         let Self { block, feed, modes, events, blocks_begun } = self;
-        ContourPiece { block, kind, feed, modes, events, blocks_begun, stop_at_end }
+        ContourPiece { block, kind, feed, modes, events, blocks_begun, block_length_lu: None, stop_at_end }
     }
 }
 
