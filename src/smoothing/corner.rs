@@ -52,6 +52,8 @@ pub(super) enum Junction {
 pub(super) enum Reason {
     /// One of the blocks is an arc.
     Arc,
+    /// One of the blocks is a spline or a polynomial.
+    Polynomial,
     /// One of the blocks moves a rotary axis.
     Rotary,
 }
@@ -93,7 +95,9 @@ impl Rules {
             return Junction::Pass;
         }
         let (Curve::Line(first), Curve::Line(second)) = (before.curve, after.curve) else {
-            return Junction::Unrounded(Reason::Arc);
+            let polynomial = |side: &Side<'_>| matches!(side.curve, Curve::Polynomial(_));
+            let reason = if polynomial(before) || polynomial(after) { Reason::Polynomial } else { Reason::Arc };
+            return Junction::Unrounded(reason);
         };
         if self.moves_rotary(first) || self.moves_rotary(second) {
             return Junction::Unrounded(Reason::Rotary);

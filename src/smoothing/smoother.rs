@@ -14,7 +14,7 @@ use super::unrounded::Unrounded;
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, PartPoint, PerAxis};
-use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
+use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, PolynomialCurve, SpatialArc};
 use crate::interpreter::{AxisPositioning, Event, Feed, Modes, Move, MoveKind, Positioning};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
@@ -33,6 +33,8 @@ pub struct Smoother {
     unrounded: Unrounded,
     /// Axes that POSA has sent away: the program ends when they have arrived.
     positioned: PerAxis<bool>,
+    /// The block that did so last: what the wait at the end belongs to where nothing else is left.
+    sent_away: Option<Head>,
 }
 
 /// The motion block whose end is not decided yet.
@@ -69,6 +71,7 @@ impl Smoother {
             carried: None,
             unrounded: Unrounded::default(),
             positioned: PerAxis::splat(false),
+            sent_away: None,
         }
     }
 
@@ -86,9 +89,13 @@ impl Smoother {
                 let arc = Arc::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Arc(arc), out);
             }
-            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
-                let line = Line::new(self.position, next.end, linear);
-                self.push_motion(next, Curve::Line(line), out);
+            MoveKind::SpatialArc(geometry) => {
+                let arc = SpatialArc::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::SpatialArc(arc), out);
+            }
+            MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => {
+                let curve = PolynomialCurve::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::Polynomial(curve), out);
             }
             MoveKind::Dwell { time_s } => {
                 let time_s = *time_s;
@@ -128,17 +135,12 @@ impl Smoother {
 
     /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
     pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
-        let last = self.held.as_ref().map(|held| Head { events: Vec::new(), blocks_begun: 0, ..held.head.clone() });
         self.rest(out);
         let carried = self.carried.take();
-        let waits = self.positioned.as_slice().contains(&true);
-        match carried.or(last.filter(|_| waits)) {
-            Some(head) if waits => {
-                let positioned = self.positioned;
-                out(self.wait_positioned(head, positioned));
-            }
-            Some(head) => out(self.wait(head, 0.0)),
-            None => {}
+        let positioned = self.positioned;
+        match self.sent_away.take().filter(|_| positioned.as_slice().contains(&true)) {
+            Some(sent_away) => out(self.wait_positioned(carried.unwrap_or(sent_away), positioned)),
+            None => carried.into_iter().for_each(|head| out(self.wait(head, 0.0))),
         }
     }
 
@@ -148,6 +150,9 @@ impl Smoother {
             self.positioned[axis.axis] = true;
             self.position.0[axis.axis] = axis.end_lu;
         }
+        let Move { block, feed, modes, .. } = &next;
+        let (feed, modes) = (feed.clone(), modes.clone());
+        self.sent_away = Some(Head { block: *block, feed, modes, events: Vec::new(), blocks_begun: 0 });
         let programmed = next.modes.programmed.clone();
         let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
         let mut events = next.events.clone();
@@ -292,7 +297,7 @@ impl Held {
 impl Head {
     fn piece(self, kind: PieceKind, stop_at_end: bool) -> ContourPiece {
         let Self { block, feed, modes, events, blocks_begun } = self;
-        ContourPiece { block, kind, feed, modes, events, blocks_begun, stop_at_end }
+        ContourPiece { block, kind, feed, modes, events, blocks_begun, block_length_lu: None, stop_at_end }
     }
 }
 

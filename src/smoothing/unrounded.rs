@@ -35,6 +35,7 @@ impl Unrounded {
         self.said.push(reason);
         let (code, why) = match reason {
             Reason::Arc => ("S0001", "one of its blocks is an arc"),
+            Reason::Polynomial => ("S0003", "one of its blocks is a spline or a polynomial"),
             Reason::Rotary => ("S0002", "one of its blocks moves a rotary axis"),
         };
         let message = format!("the corner at the end of line {} is passed as in G64, because {why}", block.line);
