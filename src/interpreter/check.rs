@@ -9,8 +9,9 @@ use super::variables::undeclared;
 use crate::base::diagnostics::nearest;
 use crate::base::{Diagnostic, Severity};
 use crate::machine::Machine;
+use crate::program::structure::Structure;
 use crate::program::syntax::{Block, Destination, Expr, Initial, Jump, Statement, Target, WordKind};
-use crate::program::{Columns, Cursor, Dialect, Fault, ProgramSource, codes, parse, visit_names};
+use crate::program::{Columns, Cursor, Dialect, Fault, Line, ProgramSource, Window, codes, parse, visit_names};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -37,21 +38,24 @@ fn columns_of(diagnostic: &Diagnostic) -> usize {
     diagnostic.place.as_ref().map_or(0, |place| place.columns.start)
 }
 
-fn lines(source: &ProgramSource) -> impl Iterator<Item = Cursor> {
+fn lines(source: &ProgramSource) -> impl Iterator<Item = (Cursor, Line)> {
     let mut cursor = source.first();
+    let mut window = Window::default();
     std::iter::from_fn(move || {
-        let (_, next) = source.line_bytes(cursor)?;
-        Some(std::mem::replace(&mut cursor, next))
+        // Running the program says why it cannot be read.
+        let (line, next) = source.line(&mut window, cursor).ok()??;
+        Some((std::mem::replace(&mut cursor, next), line))
     })
 }
 
 fn placed(source: &ProgramSource, cursor: Cursor, fault: Fault) -> Diagnostic {
-    fault.at(source.shared_name(), cursor.line, source.line_text(cursor).into_owned())
+    fault.at(source.shared_name(), cursor.line, source.line_text(cursor))
 }
 
 /// Syntax: one finding a line at most.
 fn every_line(source: &ProgramSource, dialect: &Dialect) -> Vec<Diagnostic> {
-    let parsed = lines(source).filter_map(|cursor| Some((cursor, parse(&source.line_text(cursor), dialect).err()?)));
+    let parsed =
+        lines(source).filter_map(|(cursor, line)| Some((cursor, parse(&source.decode(&line), dialect).err()?)));
     parsed.map(|(cursor, fault)| placed(source, cursor, *fault)).collect()
 }
 
@@ -59,19 +63,19 @@ fn every_line(source: &ProgramSource, dialect: &Dialect) -> Vec<Diagnostic> {
 /// would be reported twice.
 fn names_and_partners(source: &ProgramSource, dialect: &Dialect) -> Vec<Diagnostic> {
     let mut found = Vec::new();
-    for unmatched in source.structure().all_unmatched() {
+    for unmatched in source.structure().into_iter().flat_map(Structure::all_unmatched) {
         let end = source.line_text(unmatched.cursor).trim_end().len() as u32;
         found.push(placed(source, unmatched.cursor, *unbalanced(unmatched.word, unmatched.missing, 0..end)));
     }
     let mut defined: BTreeSet<Arc<str>> = BTreeSet::new();
-    for cursor in lines(source) {
-        if let Ok(Block { statement: Statement::Define(definition), .. }) = parse(&source.line_text(cursor), dialect) {
+    for (_, line) in lines(source) {
+        if let Ok(Block { statement: Statement::Define(definition), .. }) = parse(&source.decode(&line), dialect) {
             defined.extend(definition.variables.into_iter().map(|variable| variable.name));
         }
     }
     let mut reported: BTreeSet<Arc<str>> = BTreeSet::new();
-    for cursor in lines(source) {
-        let Ok(block) = parse(&source.line_text(cursor), dialect) else { continue };
+    for (cursor, line) in lines(source) {
+        let Ok(block) = parse(&source.decode(&line), dialect) else { continue };
         let mut visit = |name: &Arc<str>, columns: &Columns| {
             if !defined.contains(name) && reported.insert(name.clone()) {
                 let near = nearest(name, defined.iter().map(|known| &**known));

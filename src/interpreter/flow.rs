@@ -28,7 +28,7 @@ impl Interpreter {
             Statement::If(condition) => {
                 let partner = self.partner()?;
                 if !self.truth(condition)? {
-                    self.go_behind(partner);
+                    self.go_behind(partner)?;
                 }
                 Ok(())
             }
@@ -39,24 +39,24 @@ impl Interpreter {
                 Ok(())
             }
             // The branch before ELSE has been executed.
-            Statement::Else => self.partner().map(|end| self.go_behind(end)),
+            Statement::Else => self.partner().and_then(|end| self.go_behind(end)),
             Statement::EndIf => self.partner().map(|_| ()),
             Statement::For(for_loop) => self.enter_for(for_loop),
             Statement::EndFor => self.next_pass(),
             Statement::While(condition) => {
                 let end = self.partner()?;
                 if !self.truth(condition)? {
-                    self.go_behind(end);
+                    self.go_behind(end)?;
                 }
                 Ok(())
             }
             Statement::EndWhile => self.partner().map(|start| self.next = start),
             Statement::Loop | Statement::Repeat => self.partner().map(|_| ()),
-            Statement::EndLoop => self.partner().map(|start| self.go_behind(start)),
+            Statement::EndLoop => self.partner().and_then(|start| self.go_behind(start)),
             Statement::Until(condition) => {
                 let start = self.partner()?;
                 if !self.truth(condition)? {
-                    self.go_behind(start);
+                    self.go_behind(start)?;
                 }
                 Ok(())
             }
@@ -76,7 +76,7 @@ impl Interpreter {
     /// Line of the partner of the control word in this line.
     fn partner(&self) -> Outcome<Cursor> {
         let line = self.current.line;
-        let structure = self.source.structure();
+        let structure = self.source.structure()?;
         structure.partner(line).filter(|_| structure.unmatched(line).is_none()).ok_or_else(|| {
             let end = self.source.line_text(self.current).trim_end().len() as u32;
             match structure.unmatched(line) {
@@ -87,8 +87,10 @@ impl Interpreter {
     }
 
     /// Goes on behind a line.
-    fn go_behind(&mut self, cursor: Cursor) {
-        self.next = self.source.line_bytes(cursor).map_or(cursor, |(_, next)| next);
+    fn go_behind(&mut self, cursor: Cursor) -> Outcome<()> {
+        let line = self.source.line(&mut self.window, cursor)?;
+        self.next = line.map_or(cursor, |(_, next)| next);
+        Ok(())
     }
 
     fn enter_for(&mut self, for_loop: &ForLoop) -> Outcome<()> {
@@ -96,7 +98,7 @@ impl Interpreter {
         let first = evaluate(&for_loop.first, &self.variables)?;
         self.assign(&for_loop.counter, &first, &for_loop.counter_columns, &for_loop.first.columns)?;
         if self.counter_is_past(for_loop)? {
-            self.go_behind(end);
+            self.go_behind(end)?;
         }
         Ok(())
     }
@@ -112,7 +114,7 @@ impl Interpreter {
         };
         self.assign(&for_loop.counter, &counted, &for_loop.counter_columns, &for_loop.counter_columns)?;
         if !self.counter_is_past(for_loop)? {
-            self.go_behind(start);
+            self.go_behind(start)?;
         }
         Ok(())
     }
@@ -146,8 +148,8 @@ impl Interpreter {
             Destination::Text(text) => self.computed(&evaluate(text, &self.variables)?.text()),
         };
         let found = match number {
-            Some(number) => self.find_number(number, jump.direction),
-            None => self.source.structure().label(&name, self.current.line, jump.direction),
+            Some(number) => self.find_number(number, jump.direction)?,
+            None => self.source.structure()?.label(&name, self.current.line, jump.direction),
         };
         match found {
             Some(cursor) => self.next = cursor,
@@ -165,7 +167,10 @@ impl Interpreter {
     }
 
     fn no_target(&self, name: &str, jump: &Jump) -> Box<Fault> {
-        let structure = self.source.structure();
+        let structure = match self.source.structure() {
+            Ok(structure) => structure,
+            Err(fault) => return fault,
+        };
         let towards = match jump.direction {
             Direction::Forward => " towards the end of the program",
             Direction::Backward => " towards the start of the program",
@@ -182,33 +187,41 @@ impl Interpreter {
     }
 
     /// Searches a block number as the control does, and remembers the answer.
-    fn find_number(&mut self, number: u64, direction: Direction) -> Option<Cursor> {
+    fn find_number(&mut self, number: u64, direction: Direction) -> Outcome<Option<Cursor>> {
         let key = (self.current.line, direction, number);
         if let Some(known) = self.found_numbers.get(&key) {
-            return *known;
+            return Ok(*known);
         }
-        let following = self.next;
+        let (first, here, following) = (self.source.first(), self.current.line, self.next);
         let found = match direction {
-            Direction::Forward => self.search_number(number, following, u32::MAX, true),
-            Direction::Backward => self.search_number(number, self.source.first(), self.current.line, false),
-            _ => {
-                let forward = self.search_number(number, following, u32::MAX, true);
-                forward.or_else(|| self.search_number(number, self.source.first(), self.current.line, true))
-            }
+            Direction::Forward => self.search_number(number, following, u32::MAX, true)?,
+            Direction::Backward => self.search_number(number, first, here, false)?,
+            _ => match self.search_number(number, following, u32::MAX, true)? {
+                None => self.search_number(number, first, here, true)?,
+                found => found,
+            },
         };
         if self.found_numbers.len() < FOUND_NUMBERS_MAX {
             self.found_numbers.insert(key, found);
         }
-        found
+        Ok(found)
     }
 
     /// First or last line with the block number, from `cursor` up to and including `last_line`.
-    fn search_number(&mut self, number: u64, mut cursor: Cursor, last_line: u32, first: bool) -> Option<Cursor> {
+    fn search_number(
+        &mut self,
+        number: u64,
+        mut cursor: Cursor,
+        last_line: u32,
+        first: bool,
+    ) -> Outcome<Option<Cursor>> {
         let mut found = None;
         let mut lines = 0;
-        while let Some((line, next)) = self.source.line_bytes(cursor).filter(|_| cursor.line <= last_line) {
+        // A window of its own: the program goes on where it was.
+        let mut window = self.window.clone();
+        while let Some((line, next)) = self.source.line(&mut window, cursor)?.filter(|_| cursor.line <= last_line) {
             lines += 1;
-            if number_of(line) == Some(number) {
+            if number_of(&line) == Some(number) {
                 found = Some(cursor);
                 if first {
                     break;
@@ -218,7 +231,7 @@ impl Interpreter {
         }
         // Searching takes time too: a loop that searches without end must be found out.
         self.idle_blocks = self.idle_blocks.saturating_add(lines / SEARCHED_LINES_PER_BLOCK);
-        found
+        Ok(found)
     }
 
     fn define(&mut self, definition: &Definition) -> Outcome<()> {

@@ -11,8 +11,8 @@ use crate::machine::Machine;
 use crate::program::plain::plain_block;
 use crate::program::syntax::{Direction, Statement};
 use crate::program::{
-    Block, BlockRef, Columns, Cursor, Dialect, Fault, NotActedOn, OpenedProgram, Outcome, ProgramId, ProgramSource,
-    codes, parse,
+    Block, BlockRef, Columns, Cursor, Dialect, Fault, NotActedOn, Outcome, ProgramId, ProgramSource, Window, codes,
+    parse,
 };
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -29,6 +29,8 @@ const KEPT_LINE_BYTES_MAX: usize = 512;
 pub struct Interpreter {
     pub(super) source: ProgramSource,
     pub(super) program: ProgramId,
+    /// What of it is in memory.
+    pub(super) window: Window,
     pub(super) machine: Arc<Machine>,
     pub(super) dialect: Arc<Dialect>,
     /// X, Y and Z of the machine: the geometry axes.
@@ -77,9 +79,10 @@ impl Interpreter {
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
         }
-        let opened = OpenedProgram { id: ProgramId(0), name: source.file_name().into(), bytes: source.bytes().clone() };
+        let opened = source.opened(ProgramId(0));
         Self {
             program: ProgramId(0),
+            window: Window::default(),
             dialect: Arc::new(Dialect::new(machine)),
             geometry: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)),
             current: source.first(),
@@ -155,8 +158,7 @@ impl Interpreter {
 
     /// Executes one line.
     fn step(&mut self) -> Outcome<()> {
-        let source = self.source.clone();
-        let Some((bytes, following)) = source.line_bytes(self.next) else {
+        let Some((bytes, following)) = self.source.line(&mut self.window, self.next)? else {
             self.end();
             return Ok(());
         };
@@ -166,12 +168,12 @@ impl Interpreter {
         if self.idle_blocks > IDLE_BLOCKS_MAX {
             return Err(self.endless());
         }
-        if let Some(plain) = plain_block(bytes, &self.dialect)
+        if let Some(plain) = plain_block(&bytes, &self.dialect)
             && self.plain_move(&plain)
         {
             return Ok(());
         }
-        let block = self.parsed(bytes)?;
+        let block = self.parsed(&bytes)?;
         if block.statement != Statement::Words(Vec::new()) {
             self.number += 1;
         }
@@ -239,7 +241,7 @@ impl Interpreter {
     }
 
     fn diagnostic(&self, fault: Fault) -> Diagnostic {
-        let text = self.source.line_text(self.current).into_owned();
+        let text = self.source.line_text(self.current);
         fault.at(self.source.shared_name(), self.current.line, text)
     }
 

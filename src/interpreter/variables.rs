@@ -18,7 +18,10 @@ const ELEMENTS_MAX: usize = 100_000;
 #[derive(Clone, Debug, Default)]
 pub struct Variables {
     parameters: Vec<f64>,
+    /// Those of the program in execution.
     declared: BTreeMap<Arc<str>, Variable>,
+    /// Those of the programs that wait for its end, outermost first: out of its sight (MD11120 = 0).
+    waiting: Vec<BTreeMap<Arc<str>, Variable>>,
     elements: usize,
 }
 
@@ -33,6 +36,17 @@ struct Variable {
 }
 
 impl Variables {
+    /// A sub-program begins: it sees R parameters and none of the variables of its caller.
+    pub fn enter(&mut self) {
+        self.waiting.push(std::mem::take(&mut self.declared));
+    }
+
+    /// It ends: its variables are gone.
+    pub fn leave(&mut self) {
+        let gone = std::mem::replace(&mut self.declared, self.waiting.pop().unwrap_or_default());
+        self.elements -= gone.values().map(|variable| variable.values.len()).sum::<usize>();
+    }
+
     /// R parameter; 0 before the first assignment.
     pub fn parameter(&self, number: i32, columns: &Columns) -> Outcome<f64> {
         Ok(self.parameters.get(parameter_index(number, columns)?).copied().unwrap_or(0.0))

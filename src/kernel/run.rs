@@ -10,7 +10,7 @@ use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
 use crate::base::Diagnostic;
 use crate::machine::{Loaded, Machine, unsupported};
-use crate::program::{OpenedProgram, ProgramId, ProgramSource};
+use crate::program::{ProgramId, ProgramSource};
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
 use std::sync::Arc;
@@ -133,11 +133,7 @@ const PROGRESS_TICKS: u64 = 4096;
 
 fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Option<Recorder>, RunError> {
     let Some(path) = options.recording else { return Ok(None) };
-    let main = OpenedProgram {
-        id: ProgramId(0),
-        name: options.program.file_name().into(),
-        bytes: options.program.bytes().clone(),
-    };
+    let main = options.program.opened(ProgramId(0));
     let programs = std::slice::from_ref(&main);
     let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, programs);
     setup.mantissa_bits = options.mantissa_bits;

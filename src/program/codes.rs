@@ -74,6 +74,7 @@ macro_rules! codes {
 
 codes! {
     UNREADABLE "E0001" "The program file cannot be read";
+    LOST "E0002" "The program file changed or went away while it was read";
     BAD_CHARACTER "E0101" "A character that has no meaning here";
     BAD_NUMBER "E0102" "A number that cannot be read";
     OPEN_STRING "E0103" "A string without its closing quote";

@@ -4,10 +4,13 @@
 //! [`Fault`] with its columns; the [`structure::Structure`] of labels and control words. Does not execute anything: expressions
 //! and control words stay syntax here.
 
+pub mod archive;
+mod characters;
 pub mod codes;
 mod dialect;
 mod expression;
 mod lexer;
+pub mod library;
 mod not_acted_on;
 mod not_built;
 mod parser;
@@ -16,14 +19,17 @@ pub mod source;
 mod statements;
 pub mod structure;
 pub mod syntax;
+pub mod text;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
 pub use dialect::Dialect;
+pub use library::{SkipLevels, Surroundings};
 pub use parser::{parse, whole_number};
-pub use source::{Cursor, ProgramSource};
+pub use source::{Cursor, Line, ProgramSource, Window};
 pub use statements::{TEXT_MAX, block_number, visit_names};
 pub use syntax::Block;
+pub use text::ProgramText;
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 
 use std::sync::Arc;
@@ -51,5 +57,5 @@ pub struct OpenedProgram {
     /// File name without folders.
     pub name: Arc<str>,
     /// Bytes as they are on the disk.
-    pub bytes: Arc<[u8]>,
+    pub bytes: ProgramText,
 }

@@ -3,7 +3,8 @@
 //! In: a [`ProgramSource`], scanned once, line heads only. Out: [`Structure`]: jumps and loops never rescan the file. Its size grows
 //! with labels and control words, not with lines. Block numbers are not kept (every line may have one): they are searched.
 
-use super::source::{Cursor, ProgramSource};
+use super::codes::Outcome;
+use super::source::{Cursor, ProgramSource, Window};
 use super::syntax::Direction;
 use super::words::{self, Control, Role};
 use std::collections::BTreeMap;
@@ -38,11 +39,13 @@ struct Open {
 
 impl Structure {
     /// Reads the heads of all lines.
-    pub(super) fn scan(source: &ProgramSource) -> Self {
+    pub(super) fn scan(source: &ProgramSource) -> Outcome<Self> {
         let mut structure = Self::default();
         let mut open: Vec<Open> = Vec::new();
         let mut cursor = source.first();
-        while let Some((line, next)) = source.line_bytes(cursor) {
+        let mut window = Window::default();
+        while let Some((line, next)) = source.line(&mut window, cursor)? {
+            let line = &*line;
             let (label, word) = head(line);
             if let Some(label) = label {
                 let label = String::from_utf8_lossy(label).to_ascii_uppercase();
@@ -56,7 +59,7 @@ impl Structure {
         while let Some(left) = open.pop() {
             structure.miss(left.control, left.cursor);
         }
-        structure
+        Ok(structure)
     }
 
     /// The line of the partner of the control word in `line`.
