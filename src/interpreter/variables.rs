@@ -25,6 +25,55 @@ pub struct Variables {
     elements: usize,
 }
 
+/// A whole variable, outside of [`Variables`].
+#[derive(Clone, Debug)]
+pub struct Whole(Variable);
+
+impl Whole {
+    /// A single value, converted to its type; `line` is where it is declared.
+    pub fn of(variable_type: VariableType, value: Option<&Value>, line: u32, columns: &Columns) -> Outcome<Self> {
+        let value = match value {
+            Some(value) => convert(variable_type, value, columns)?,
+            None => zero(variable_type),
+        };
+        Ok(Self(Variable { variable_type, line, dimensions: Vec::new(), values: vec![value] }))
+    }
+
+    /// The same as a parameter of that type, declared in `line`: every value is converted.
+    pub fn converted(mut self, variable_type: VariableType, line: u32, columns: &Columns) -> Outcome<Self> {
+        for value in &mut self.0.values {
+            *value = convert(variable_type, value, columns)?;
+        }
+        self.0.variable_type = variable_type;
+        self.0.line = line;
+        Ok(self)
+    }
+
+    /// Its type.
+    pub fn variable_type(&self) -> VariableType {
+        self.0.variable_type
+    }
+
+    /// Sizes of its dimensions; empty for a single value.
+    pub fn dimensions(&self) -> &[usize] {
+        &self.0.dimensions
+    }
+
+    /// The value of a single one.
+    pub fn single(&self) -> Option<&Value> {
+        self.0.values.first().filter(|_| self.0.dimensions.is_empty())
+    }
+}
+
+fn zero(variable_type: VariableType) -> Value {
+    match variable_type {
+        VariableType::Bool => Value::Bool(false),
+        VariableType::Char | VariableType::Int => Value::Int(0),
+        VariableType::Real => Value::Real(0.0),
+        VariableType::Text(_) => Value::Text(Arc::from("")),
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Variable {
     variable_type: VariableType,
@@ -110,14 +159,36 @@ impl Variables {
             .label(format!("at most {ELEMENTS_MAX}")));
         }
         self.elements = elements;
-        let zero = match variable_type {
-            VariableType::Bool => Value::Bool(false),
-            VariableType::Char | VariableType::Int => Value::Int(0),
-            VariableType::Real => Value::Real(0.0),
-            VariableType::Text(_) => Value::Text(Arc::from("")),
-        };
+        let zero = zero(variable_type);
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
+        Ok(())
+    }
+
+    /// A whole variable, to be handed to a sub-program.
+    pub fn whole(&self, name: &str, columns: &Columns) -> Outcome<Whole> {
+        self.declared(name, columns).map(|variable| Whole(variable.clone()))
+    }
+
+    /// A whole variable as a sub-program left it: stored in one of the same size.
+    pub fn set_whole(&mut self, name: &str, whole: Whole) {
+        if let Some(variable) = self.declared.get_mut(name)
+            && variable.values.len() == whole.0.values.len()
+        {
+            variable.values = whole.0.values;
+        }
+    }
+
+    /// A parameter of a sub-program.
+    pub fn define_parameter(&mut self, name: &Arc<str>, whole: Whole, columns: &Columns) -> Outcome<()> {
+        let elements = self.elements.saturating_add(whole.0.values.len());
+        if elements > ELEMENTS_MAX {
+            let message = format!("all variables together would have {elements} elements");
+            return Err(Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), message)
+                .label(format!("at most {ELEMENTS_MAX}")));
+        }
+        self.elements = elements;
+        self.declared.insert(name.clone(), whole.0);
         Ok(())
     }
 

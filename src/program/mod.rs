@@ -5,6 +5,7 @@
 //! and control words stay syntax here.
 
 pub mod archive;
+mod calls;
 mod characters;
 pub mod codes;
 mod dialect;
@@ -24,7 +25,7 @@ pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
 pub use dialect::Dialect;
-pub use library::{SkipLevels, Surroundings};
+pub use library::{Library, Shipped, UnitId};
 pub use parser::{parse, whole_number};
 pub use source::{Cursor, Line, ProgramSource, Window};
 pub use statements::{TEXT_MAX, block_number, visit_names};

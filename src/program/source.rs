@@ -9,7 +9,6 @@ use super::OpenedProgram;
 use super::archive::{Section, sections};
 use super::characters::{BYTE_ORDER_MARK, Utf8Check, no_program, windows_1252};
 use super::codes::{self, Fault, Outcome};
-use super::library::Surroundings;
 use super::structure::Structure;
 use super::text::ProgramText;
 use crate::base::Diagnostic;
@@ -30,7 +29,6 @@ pub struct ProgramSource {
     file: Arc<ProgramFile>,
     section: usize,
     structure: Arc<OnceLock<Outcome<Structure>>>,
-    surroundings: Arc<Surroundings>,
 }
 
 /// A file with all its programs.
@@ -126,18 +124,7 @@ impl ProgramSource {
         // An archive may hold its sub-programs first.
         let main = file.sections.iter().position(|section| matches!(&*section.extension, "" | "MPF"));
         let (section, file) = (main.unwrap_or(0), Arc::new(file));
-        Self { file, section, structure: Arc::default(), surroundings: Arc::default() }
-    }
-
-    /// The same program with what it is run with: folders of sub-programs, skip levels.
-    pub fn within(mut self, surroundings: Surroundings) -> Self {
-        self.surroundings = Arc::new(surroundings);
-        self
-    }
-
-    /// What it is run with.
-    pub fn surroundings(&self) -> &Arc<Surroundings> {
-        &self.surroundings
+        Self { file, section, structure: Arc::default() }
     }
 
     /// Name as given, with its folders.
@@ -159,6 +146,11 @@ impl ProgramSource {
     pub fn folder(&self) -> Option<&Path> {
         let folder = self.file.path.as_deref()?.parent()?;
         Some(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
+    }
+
+    /// Where the file is; `None` for a text that never was a file.
+    pub fn path(&self) -> Option<&Path> {
+        self.file.path.as_deref()
     }
 
     /// Bytes of the whole file.

@@ -153,7 +153,7 @@ fn names(control: Control) -> (&'static str, &'static str) {
         Control::EndLoop => ("ENDLOOP", "LOOP"),
         Control::Repeat => ("REPEAT", "UNTIL"),
         Control::Until => ("UNTIL", "REPEAT"),
-        Control::Define | Control::Declaration | Control::Jump(_) | Control::Case => ("", ""),
+        _ => ("", ""),
     }
 }
 
@@ -170,6 +170,23 @@ pub fn number_of(line: &[u8]) -> Option<u64> {
         return None;
     }
     digits[..count].iter().try_fold(0_u64, |number, digit| number.checked_mul(10)?.checked_add(u64::from(digit - b'0')))
+}
+
+/// Skip level of a line, without decoding it: `/` and `/0` are level 0.
+pub fn skip_level_of(line: &[u8]) -> Option<u8> {
+    let mut at = blanks(line);
+    if line.get(at) != Some(&b'/') {
+        // The level may stand behind the block number.
+        number_of(line)?;
+        at += 1 + blanks(&line[at + 1..]);
+        at += line[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+        at += blanks(&line[at..]);
+    }
+    if line.get(at) != Some(&b'/') {
+        return None;
+    }
+    let digit = line.get(at + 1).filter(|byte| byte.is_ascii_digit());
+    Some(digit.map_or(0, |digit| digit - b'0'))
 }
 
 /// Label and first word of a line.
@@ -222,10 +239,9 @@ fn structural(word: &[u8], line: &[u8]) -> Option<Control> {
     }
     let Some(Role::Control(control)) = std::str::from_utf8(word).ok().and_then(words::role) else { return None };
     match control {
-        Control::Define | Control::Declaration | Control::Jump(_) | Control::Case => None,
         Control::If if has_jump(line) => None,
         Control::Repeat if !repeat_stands_alone(line) => None,
-        control => Some(control),
+        control => (!names(control).0.is_empty()).then_some(control),
     }
 }
 
