@@ -43,7 +43,7 @@ fn scratch(name: &str) -> PathBuf {
 fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutcome {
     let options = RunOptions {
         machine,
-        program: program(text),
+        setup: program(text).into(),
         drives: true,
         recording: Some(path),
         mantissa_bits: None,
@@ -136,7 +136,7 @@ fn a_machine_that_asks_for_what_is_not_built_is_refused_by_the_library_too() {
         let loaded = machine("spinner_mvc850", &[set]);
         let options = RunOptions {
             machine: &loaded,
-            program: program(PROGRAM),
+            setup: program(PROGRAM).into(),
             drives: false,
             recording: None,
             mantissa_bits: None,

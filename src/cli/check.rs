@@ -3,7 +3,7 @@
 //! In: program, machine. Out: findings on stderr, a count or JSON on stdout. Does not plan or simulate.
 
 use super::failure::Failure;
-use super::inputs::{MachineChoice, open_program};
+use super::inputs::{MachineChoice, Surroundings};
 use super::output::{print, print_json, show};
 use crate::base::{Diagnostic, Severity};
 use crate::interpreter;
@@ -20,6 +20,8 @@ pub(super) struct CheckArguments {
     program: PathBuf,
     #[command(flatten)]
     machine: MachineChoice,
+    #[command(flatten)]
+    surroundings: Surroundings,
     /// One JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
@@ -27,8 +29,9 @@ pub(super) struct CheckArguments {
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load()?;
-    let program = open_program(&arguments.program)?;
-    let findings = interpreter::check(&program, &machine.machine);
+    let setup = arguments.surroundings.open(&arguments.program)?;
+    let program = &setup.program;
+    let findings = interpreter::check(&setup, &machine.machine);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     show(&shortened(&findings));
     if arguments.json {

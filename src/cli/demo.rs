@@ -38,7 +38,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
     let recording = folder.join("spline.mcap");
     let options = RunOptions {
         machine: &machine,
-        program,
+        setup: program.into(),
         drives: true,
         recording: Some(&recording),
         mantissa_bits: None,

@@ -5,8 +5,9 @@
 use super::failure::Failure;
 use super::output::show;
 use crate::base::Diagnostic;
+use crate::interpreter::Setup;
 use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, load, unsupported};
-use crate::program::ProgramSource;
+use crate::program::{ProgramSource, taken_axis_names};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +34,9 @@ impl MachineChoice {
                 DEFAULT_MACHINE
             }
         };
-        load(name, &self.sets).map_err(refused)
+        let loaded = load(name, &self.sets).map_err(refused)?;
+        let taken = taken_axis_names(&loaded.machine);
+        if taken.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(taken)) }
     }
 
     /// The machine file, if it is one that can be overwritten.
@@ -46,6 +49,34 @@ impl MachineChoice {
         let loaded = self.load()?;
         let refused = unsupported(&loaded.machine);
         if refused.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(refused)) }
+    }
+}
+
+/// What lies around a program.
+#[derive(Args)]
+pub(super) struct Surroundings {
+    /// Folder in which sub-programs are looked for, after that of the program; may be given several times
+    #[arg(short = 'I', long = "include", value_name = "FOLDER")]
+    include: Vec<PathBuf>,
+    /// File with definitions of global user variables (GUD); may be given several times
+    #[arg(long = "gud", value_name = "FILE.DEF")]
+    definitions: Vec<PathBuf>,
+    /// Skip levels to activate, such as 0,3: blocks with / or /3 are not executed
+    #[arg(long = "skip", value_name = "LEVELS", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(0..=9))]
+    skip: Vec<u8>,
+}
+
+impl Surroundings {
+    /// Opens a program with what lies around it.
+    pub(super) fn open(&self, program: &Path) -> Result<Setup, Failure> {
+        let open = |path: &PathBuf| ProgramSource::from_file(path).map_err(Failure::unreadable);
+        Ok(Setup {
+            directories: self.include.clone(),
+            shipped: SHIPPED_PROGRAMS,
+            definitions: self.definitions.iter().map(open).collect::<Result<_, _>>()?,
+            skip_levels: self.skip.iter().fold(0, |levels, level| levels | 1 << level),
+            ..Setup::from(open_program(program)?)
+        })
     }
 }
 

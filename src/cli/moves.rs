@@ -3,7 +3,7 @@
 //! In: program, machine. Out: one line or one JSON object a move, streamed. Does not smooth or plan.
 
 use super::failure::Failure;
-use super::inputs::{MachineChoice, open_program};
+use super::inputs::{MachineChoice, Surroundings};
 use super::output::{show, written};
 use crate::base::{AxisKind, PartPoint, units};
 use crate::interpreter::{Interpreter, Listing, Move, MoveKind, feed_per_minute, kind_name};
@@ -20,6 +20,8 @@ pub(super) struct MovesArguments {
     program: PathBuf,
     #[command(flatten)]
     machine: MachineChoice,
+    #[command(flatten)]
+    surroundings: Surroundings,
     /// One JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
@@ -27,8 +29,8 @@ pub(super) struct MovesArguments {
 
 pub(super) fn moves(arguments: &MovesArguments) -> Result<(), Failure> {
     let loaded = arguments.machine.load()?;
-    let program = open_program(&arguments.program)?;
-    let mut interpreter = Interpreter::new(program, &loaded.machine);
+    let setup = arguments.surroundings.open(&arguments.program)?;
+    let mut interpreter = Interpreter::new(setup, &loaded.machine);
     let mut listing = Listing::new(&loaded.machine);
     // Streamed: the program may have ten million blocks. A closed pipe is the reader's way to say "enough".
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());

@@ -3,7 +3,7 @@
 //! In: program, machine, options. Out: a recording, figures as table or JSON, findings. Does not compute any of them.
 
 use super::failure::Failure;
-use super::inputs::{MachineChoice, default_recording, open_program, refuse_same_file};
+use super::inputs::{MachineChoice, Surroundings, default_recording, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show, table};
 use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome, RunSummary};
@@ -20,6 +20,8 @@ pub(super) struct RunArguments {
     program: PathBuf,
     #[command(flatten)]
     machine: MachineChoice,
+    #[command(flatten)]
+    surroundings: Surroundings,
     /// Recording to write; default: the program's name with .mcap, in the current folder
     #[arg(short, long, value_name = "TRACE.mcap")]
     output: Option<PathBuf>,
@@ -55,7 +57,7 @@ fn positive(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load_to_run()?;
-    let program = open_program(&arguments.program)?;
+    let setup = arguments.surroundings.open(&arguments.program)?;
     let recording = arguments.output.clone().unwrap_or_else(|| default_recording(&arguments.program));
     refuse_same_file([arguments.program.as_path()].into_iter().chain(arguments.machine.path()), &recording)?;
     let mut signals = parse_signals(arguments.record.as_deref(), &machine)?;
@@ -65,7 +67,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
     let options = RunOptions {
         machine: &machine,
-        program,
+        setup,
         drives: !arguments.no_drives,
         recording: Some(&recording),
         mantissa_bits: arguments.record_precision,

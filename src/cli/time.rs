@@ -3,7 +3,7 @@
 //! In: programs, machine. Out: figures as tables or one JSON document. Does not simulate drives.
 
 use super::failure::Failure;
-use super::inputs::{MachineChoice, open_program};
+use super::inputs::{MachineChoice, Surroundings};
 use super::output::{ProgressLine, print, print_json, show};
 use super::run::{Style, figures_text};
 use crate::kernel::{self, RunOptions, RunOutcome};
@@ -21,6 +21,8 @@ pub(super) struct TimeArguments {
     programs: Vec<PathBuf>,
     #[command(flatten)]
     machine: MachineChoice,
+    #[command(flatten)]
+    surroundings: Surroundings,
     /// Threads: 1 runs preparation inside the cycle; the result is the same
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
@@ -34,7 +36,7 @@ pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
     let mut documents = Vec::new();
     let mut alarmed = false;
     for program in &arguments.programs {
-        let outcome = one(program, &machine, arguments.threads)?;
+        let outcome = one(program, &machine, arguments)?;
         show(&outcome.warnings);
         if let Some(alarm) = &outcome.alarm {
             show([alarm]);
@@ -56,16 +58,16 @@ pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
     if alarmed { Err(Failure::told()) } else { Ok(()) }
 }
 
-fn one(path: &Path, machine: &Loaded, threads: u16) -> Result<RunOutcome, Failure> {
-    let program = open_program(path)?;
+fn one(path: &Path, machine: &Loaded, arguments: &TimeArguments) -> Result<RunOutcome, Failure> {
+    let setup = arguments.surroundings.open(path)?;
     let options = RunOptions {
         machine,
-        program,
+        setup,
         drives: false,
         recording: None,
         mantissa_bits: None,
         signals: SignalChoice::all(),
-        threads: threads.into(),
+        threads: arguments.threads.into(),
         pace_ratio: None,
     };
     let mut line = ProgressLine::new();

@@ -6,9 +6,10 @@
 use super::evaluate::{evaluate, integers, number};
 use super::modal::Motion;
 use super::motion::{AxisWord, MotionWords};
+use super::path_words::CornerWords;
 use super::run::Interpreter;
 use super::value::Value;
-use super::wire::{Event, MoveKind};
+use super::wire::{Event, Move, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
 use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure};
@@ -42,6 +43,8 @@ pub(super) struct Collected {
     pub spindle_speed_rpm: Option<(f64, Columns)>,
     pub frame: Option<(FrameWord, Columns)>,
     dwell: Option<Columns>,
+    /// RND, CHF, CHR, FRC.
+    pub corner: CornerWords,
     /// Output with the motion.
     pub events: Vec<Event>,
     /// T and M6: output before the motion where the block has an M6.
@@ -76,7 +79,7 @@ impl Interpreter {
             self.emit_function(block.last, true);
         }
         if block.ends {
-            self.end();
+            self.end()?;
         }
         Ok(())
     }
@@ -87,8 +90,18 @@ impl Interpreter {
             let tool_events = std::mem::take(&mut block.tool_events);
             self.emit_function(tool_events, true);
         }
+        if !block.motion.any() && block.corner.has_shape() {
+            let columns = block.corner.columns();
+            return Err(Fault::new(codes::BAD_BLOCK, columns, "RND, CHF or CHR in a block without motion")
+                .label("expected the block that leads to the corner")
+                .help("RNDM= rounds all corners from here on"));
+        }
         if block.motion.any() {
             self.motion(&block.motion, &mut events)?;
+            if let Some(last) = self.queue.pop_back() {
+                let corner = self.corner_insert(&last.kind, &block.corner);
+                self.queue.push_back(Move { corner, ..last });
+            }
         }
         if !events.is_empty() {
             self.emit_function(events, false);
@@ -223,7 +236,6 @@ impl Interpreter {
             Keyword::SuppressFrames => block.motion.suppress_frames = true,
             Keyword::Frame(word) => block.frame = Some((word, columns.clone())),
             Keyword::StopPreparation => block.stops = true,
-            Keyword::Return => block.ends = true,
         }
         Ok(())
     }

@@ -13,15 +13,16 @@
 //! line of the program
 //! ```
 //!
+//! A corner that RND, RNDM, CHF or CHR fills adds `RND=5`, `CHF=2` or `CHR=2` before the modes, with FRC or FRCM as `FRC300`.
 //! A dwell adds `4s`, a function that brings the path to rest adds `stops`. Numbers have at most six decimals and no trailing
 //! zeros. Does not read them back.
 
 use super::motion::rotary_alone;
 use super::value::trimmed;
-use super::wire::{Event, Feed, Modes, Move, MoveKind};
+use super::wire::{Compressor, CornerInsert, CornerShape, Event, Feed, Modes, Move, MoveKind, ProgrammedLimits};
 use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
 use crate::base::{AxisId, AxisKind, PartPoint};
-use crate::machine::{AccelerationMode, Machine, PathMode};
+use crate::machine::{AccelerationMode, Axis, Machine, PathMode};
 use std::fmt::Write;
 
 /// Writes moves line by line; remembers the modes of the last one.
@@ -71,6 +72,12 @@ impl<'m> Listing<'m> {
         }) {
             words.push(length("ADIS", modes.rounding_distance_mm));
         }
+        if before.map_or(modes.compressor != Compressor::Off, |before| before.compressor != modes.compressor) {
+            words.push(compressor_name(modes.compressor).to_owned());
+        }
+        let known = self.tolerance_words(before.and_then(|before| before.programmed.as_deref()));
+        let now = self.tolerance_words(modes.programmed.as_deref());
+        words.extend(now.into_iter().zip(known).filter(|(now, known)| now != known).map(|(now, _)| now));
         if before.is_none_or(|before| before.acceleration_mode != modes.acceleration_mode) {
             words.push(match modes.acceleration_mode {
                 AccelerationMode::Soft => "SOFT".to_owned(),
@@ -82,6 +89,22 @@ impl<'m> Listing<'m> {
             words.push(if modes.feedforward_active { "FFWON" } else { "FFWOF" }.to_owned());
         }
         words.join(" ")
+    }
+
+    /// OTOL, ATOL and STOLF; `-` where none is programmed.
+    fn tolerance_words(&self, limits: Option<&ProgrammedLimits>) -> Vec<String> {
+        let none = ProgrammedLimits::default();
+        let limits = limits.unwrap_or(&none);
+        let shown = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), trimmed);
+        let mut words = vec![format!("OTOL{}", shown(limits.orientation_tolerance_rad.map(deg_from_rad)))];
+        for id in self.machine.axis_ids() {
+            let Axis { name, kind, .. } = self.machine.axis(id);
+            let tolerance = limits.axis_tolerance_lu[id];
+            let customary = if *kind == AxisKind::Rotary { tolerance.map(deg_from_rad) } else { tolerance };
+            words.push(format!("ATOL[{name}]{}", shown(customary)));
+        }
+        words.push(format!("STOLF{}", shown(limits.rapid_tolerance_ratio)));
+        words
     }
 }
 
@@ -146,6 +169,9 @@ fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<
         let (radius, sweep) = (trimmed(arc.radius_mm), trimmed(deg_from_rad(arc.sweep_rad)));
         add(&mut text, &format!("{}{} C{a},{b} R{radius} sweep={sweep}", name(first), name(second)));
     }
+    if let Some(corner) = &shown.corner {
+        add(&mut text, &corner_text(corner));
+    }
     if let Some(modes) = modes {
         add(&mut text, &format!("[{modes}]"));
     }
@@ -187,6 +213,27 @@ fn path_mode_name(mode: PathMode) -> &'static str {
         PathMode::G644 => "G644",
         PathMode::G645 => "G645",
     }
+}
+
+fn compressor_name(compressor: Compressor) -> &'static str {
+    match compressor {
+        Compressor::Off => "COMPOF",
+        Compressor::On => "COMPON",
+        Compressor::Curvature => "COMPCURV",
+        Compressor::Cad => "COMPCAD",
+        Compressor::Surface => "COMPSURF",
+    }
+}
+
+/// `RND=5`, `CHF=2 FRC300`.
+fn corner_text(corner: &CornerInsert) -> String {
+    let (word, length_mm) = match corner.shape {
+        CornerShape::Fillet { radius_mm } => ("RND", radius_mm),
+        CornerShape::ChamferBase { length_mm } => ("CHF", length_mm),
+        CornerShape::ChamferLeg { length_mm } => ("CHR", length_mm),
+    };
+    let feed = corner.feed_mm_s.map_or_else(String::new, |feed| format!(" FRC{}", trimmed(mm_min_from_mm_s(feed))));
+    format!("{word}={}{feed}", trimmed(length_mm))
 }
 
 fn event_text(event: &Event) -> String {

@@ -12,22 +12,25 @@
 //! * G70 converts positions, arcs and frames; G700 also F, CTOL and ADIS. Rotary axes are never converted.
 //! * With G91 or IC() an axis also makes good a change of TRANS since its last motion (SD42440 = 1, the control's default).
 //! * Absolute positions of an endless axis are taken as they are; DC, ACP and ACN choose the way round.
-//! * Skip levels (`/`) are not active: these blocks are executed.
+//! * Blocks with `/` to `/9` are executed, unless their level is among the active skip levels of the [`Setup`].
 //! * G601 is what is done; G602 and G603 are reported. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
 mod arc;
 mod block;
+mod call;
 mod check;
 mod curve_words;
 mod evaluate;
 mod feed_words;
 mod flow;
 mod frame_words;
+mod jump;
 mod listing;
 mod modal;
 mod motion;
 mod path_words;
 mod run;
+mod setup;
 mod value;
 mod variables;
 mod wire;
@@ -36,4 +39,5 @@ pub use crate::program::{ProgramSource, known_words};
 pub use check::check;
 pub use listing::{Listing, feed_per_minute, format_move, kind_name, listing};
 pub use run::Interpreter;
+pub use setup::Setup;
 pub use wire::*;

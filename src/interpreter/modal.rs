@@ -2,6 +2,7 @@
 //!
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
+use super::path_words::ModalCorner;
 use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
 use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
@@ -52,6 +53,8 @@ pub struct Modal {
     pub rounding_distance_mm: Option<f64>,
     /// ADISPOS.
     pub rapid_rounding_distance_mm: Option<f64>,
+    /// RNDM and FRCM.
+    pub corner: ModalCorner,
     /// G601, G602, G603.
     pub exact_stop: ExactStop,
     /// COMPOF, COMPON and so on.
@@ -86,6 +89,7 @@ impl Modal {
             contour_tolerance_mm: None,
             rounding_distance_mm: None,
             rapid_rounding_distance_mm: None,
+            corner: ModalCorner::default(),
             exact_stop: ExactStop::Fine,
             compressor: Compressor::Off,
             acceleration_mode: settings.default_acceleration_mode,
@@ -97,6 +101,19 @@ impl Modal {
             spindle_speed_rpm: 0.0,
             translation_lu: AxisVector::zero(),
         }
+    }
+
+    /// SAVE: G functions and frames of `saved` hold again; feed, spindle, tool and the other addresses stay.
+    pub fn restore(&mut self, saved: Self) {
+        let now = std::mem::replace(self, saved);
+        self.feed = now.feed;
+        self.spindle_speed_rpm = now.spindle_speed_rpm;
+        self.tool = now.tool;
+        self.programmed = now.programmed;
+        self.contour_tolerance_mm = now.contour_tolerance_mm;
+        self.rounding_distance_mm = now.rounding_distance_mm;
+        self.rapid_rounding_distance_mm = now.rapid_rounding_distance_mm;
+        self.corner = now.corner;
     }
 
     /// Modes for the wire; `exact_stop` = G9 in this block.

@@ -39,6 +39,26 @@ impl Whole {
         Ok(Self(Variable { variable_type, line, dimensions: Vec::new(), values: vec![value] }))
     }
 
+    /// All values the same, or 0; `line` is where it is declared.
+    pub fn filled(
+        variable_type: VariableType,
+        sizes: &[i32],
+        value: Option<&Value>,
+        line: u32,
+        columns: &Columns,
+    ) -> Outcome<Self> {
+        let Self(mut variable) = Self::of(variable_type, value, line, columns)?;
+        let sizes: Vec<usize> = sizes.iter().map(|size| usize::try_from(*size).unwrap_or(0).max(1)).collect();
+        let count = sizes.iter().fold(1_usize, |count, size| count.saturating_mul(*size));
+        if count > ELEMENTS_MAX {
+            return Err(Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), format!("an array of {count} elements"))
+                .label(format!("at most {ELEMENTS_MAX}")));
+        }
+        variable.values.resize(count, variable.values[0].clone());
+        variable.dimensions = sizes;
+        Ok(Self(variable))
+    }
+
     /// The same as a parameter of that type, declared in `line`: every value is converted.
     pub fn converted(mut self, variable_type: VariableType, line: u32, columns: &Columns) -> Outcome<Self> {
         for value in &mut self.0.values {
@@ -184,12 +204,18 @@ impl Variables {
         let elements = self.elements.saturating_add(whole.0.values.len());
         if elements > ELEMENTS_MAX {
             let message = format!("all variables together would have {elements} elements");
-            return Err(Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), message)
-                .label(format!("at most {ELEMENTS_MAX}")));
+            return Err(
+                Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), message).label(format!("at most {ELEMENTS_MAX}"))
+            );
         }
         self.elements = elements;
         self.declared.insert(name.clone(), whole.0);
         Ok(())
+    }
+
+    /// True if DEF has made it.
+    pub fn is_declared(&self, name: &str) -> bool {
+        self.declared.contains_key(name)
     }
 
     /// Value of a variable or array element.

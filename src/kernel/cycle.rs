@@ -11,9 +11,9 @@ use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
 use crate::drive::{AxisSignals, Drive, DriveInput, IdealDrive, Start};
 use crate::interpolator::{AxisSetpoint, Begun, FineInterpolator, Interpolator, Setpoint};
+use crate::interpreter::Setup;
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::machine::{Axis, Machine};
-use crate::program::ProgramSource;
 use std::sync::Arc;
 
 /// How a cycle ended.
@@ -103,7 +103,7 @@ pub struct Kernel<S = Preparation> {
 impl Kernel<Preparation> {
     /// At the start of `program`. With `drives` false every axis is ideal. The caller sees to it that [`unsupported`](crate::machine::unsupported)
     /// has nothing against the machine, as [`run`](super::run) does: a value that is not built yet would be passed over.
-    pub fn new(machine: Arc<Machine>, program: ProgramSource, drives: bool) -> Self {
+    pub fn new(machine: Arc<Machine>, program: impl Into<Setup>, drives: bool) -> Self {
         let source = Preparation::new(program, &machine);
         Self::with_source(machine, source, drives)
     }

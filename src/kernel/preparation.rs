@@ -6,10 +6,9 @@
 
 use crate::base::Diagnostic;
 use crate::feed::{PlannedPiece, Planner};
-use crate::interpreter::Interpreter;
+use crate::interpreter::{Interpreter, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
-use crate::program::ProgramSource;
 use crate::smoothing::{ContourPiece, Smoother};
 
 /// Where the cycle gets its pieces from: preparation itself, or a channel to the thread it runs on.
@@ -44,7 +43,7 @@ pub struct Preparation {
 
 impl Preparation {
     /// At the start of `program`, axes at home.
-    pub fn new(program: ProgramSource, machine: &Machine) -> Self {
+    pub fn new(program: impl Into<Setup>, machine: &Machine) -> Self {
         Self {
             interpreter: Interpreter::new(program, machine),
             smoother: Smoother::new(machine),

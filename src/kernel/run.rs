@@ -9,8 +9,9 @@ use super::record::{record_alarm, record_cycle};
 use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
 use crate::base::Diagnostic;
+use crate::interpreter::Setup;
 use crate::machine::{Loaded, Machine, unsupported};
-use crate::program::{ProgramId, ProgramSource};
+use crate::program::ProgramId;
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
 use std::sync::Arc;
@@ -20,8 +21,8 @@ use std::time::{Duration, Instant};
 pub struct RunOptions<'a> {
     /// The machine, as loaded.
     pub machine: &'a Loaded,
-    /// The main program.
-    pub program: ProgramSource,
+    /// The main program, and what lies around it.
+    pub setup: Setup,
     /// Simulate the drives; otherwise every axis is ideal.
     pub drives: bool,
     /// Where to record; `None`: figures only.
@@ -74,15 +75,15 @@ pub struct Deadlines {
 #[derive(Debug)]
 pub struct RunError(pub Diagnostic);
 
-/// Runs `options.program` to its end. Errors: the machine asks for what is not built yet ([`unsupported`]), no thread is to be had, the
+/// Runs `options.setup` to its end. Errors: the machine asks for what is not built yet ([`unsupported`]), no thread is to be had, the
 /// recording cannot be written.
 pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Result<RunOutcome, RunError> {
     if let Some(refused) = unsupported(&options.machine.machine).into_iter().next() {
         return Err(RunError(refused));
     }
     let machine = Arc::new(options.machine.machine.clone());
-    tracing::info!(program = options.program.file_name(), machine = %machine.name, threads = options.threads, drives = options.drives, "run starts");
-    let preparation = Preparation::new(options.program.clone(), &machine);
+    tracing::info!(program = options.setup.program.file_name(), machine = %machine.name, threads = options.threads, drives = options.drives, "run starts");
+    let preparation = Preparation::new(options.setup.clone(), &machine);
     if options.threads > 1 {
         let source = PreparationThread::spawn(preparation)
             .map_err(|error| RunError(Diagnostic::error("K0001", format!("no thread for preparation: {error}"))))?;
@@ -133,7 +134,7 @@ const PROGRESS_TICKS: u64 = 4096;
 
 fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Option<Recorder>, RunError> {
     let Some(path) = options.recording else { return Ok(None) };
-    let main = options.program.opened(ProgramId(0));
+    let main = options.setup.program.opened(ProgramId(0));
     let programs = std::slice::from_ref(&main);
     let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, programs);
     setup.mantissa_bits = options.mantissa_bits;
@@ -165,7 +166,7 @@ fn conclude<S: PieceSource>(
     if let Some(alarm) = &alarm {
         tracing::error!(code = alarm.code, line = alarm.line(), message = %alarm.message, "alarm");
     }
-    let mut summary = RunSummary::new(&machine, options.program.file_name(), kernel.figures(), options.drives);
+    let mut summary = RunSummary::new(&machine, options.setup.program.file_name(), kernel.figures(), options.drives);
     summary.add_warnings(&warnings);
     if let Some(alarm) = &alarm {
         summary.set_alarm(alarm);

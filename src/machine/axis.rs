@@ -101,9 +101,25 @@ pub(super) fn lu(kind: AxisKind, value_mm_or_deg: f64) -> f64 {
     }
 }
 
-/// A letter, or a letter and digits, that means nothing else in a program.
+/// Longest name of an axis with several letters.
+const LONG_NAME_MAX: usize = 15;
+
+/// `ELX`, `SP1`: at least two capital letters, then letters, digits and underscores. Whether the language has such a word only the
+/// room of the program knows.
+fn is_long_name(name: &str) -> bool {
+    let bytes = name.as_bytes();
+    let rest = |byte: &u8| byte.is_ascii_uppercase() || byte.is_ascii_digit() || *byte == b'_';
+    (2..=LONG_NAME_MAX).contains(&bytes.len())
+        && bytes[..2].iter().all(u8::is_ascii_uppercase)
+        && bytes[2..].iter().all(rest)
+}
+
+/// A letter, a letter and digits, or several letters, that mean nothing else in a program.
 fn check_name(parent: &Section<'_>, entry: &Entry) {
     let name = entry.key.as_str();
+    if is_long_name(name) {
+        return;
+    }
     let mut chars = name.chars();
     let letter = chars.next().unwrap_or(' ');
     let digits: String = chars.collect();
@@ -119,10 +135,12 @@ fn check_name(parent: &Section<'_>, entry: &Entry) {
             format!("use one of {}", free.join(", ")),
         );
     } else if !letter.is_ascii_uppercase() || digits.len() > 2 || !digits.chars().all(|c| c.is_ascii_digit()) {
-        let message = format!("the axis name {name:?} is not a capital letter, or one with one or two digits");
+        let message = format!(
+            "the axis name {name:?} is not a capital letter, one with one or two digits, or several capital letters"
+        );
         let help = match (letter, digits.as_str()) {
             ('a'..='z', "") => format!("write [axes.{capital}]"),
-            _ => "write a name such as X or X1".to_owned(),
+            _ => "write a name such as X, X1 or SPX".to_owned(),
         };
         report(message, help);
     }

@@ -25,7 +25,7 @@ pub fn schema() -> Value {
     let axes = json!({
         "type": "object",
         "description": "the axes, by their names in programs: a capital letter, or one with digits",
-        "patternProperties": { "^[A-CEO-QU-Z][0-9]{0,2}$": axis },
+        "patternProperties": { "^([A-CEO-QU-Z][0-9]{0,2}|[A-Z]{2}[A-Z0-9_]{0,13})$": axis },
         "additionalProperties": false,
         "minProperties": 1,
         "maxProperties": crate::base::AXES_MAX,

@@ -88,7 +88,9 @@ fn read_header(bytes: &[u8], header: Cursor) -> Option<Section> {
     let line = String::from_utf8_lossy(&bytes[..end]).trim().to_ascii_uppercase();
     let (name, extension) = if line.starts_with("%_N_") {
         split_name(line.split_whitespace().next().unwrap_or_default().trim_start_matches('%'))
-    } else if let Some((name, extension @ ("MPF" | "SPF"))) = line.strip_prefix('%').and_then(|line| line.rsplit_once('_')) {
+    } else if let Some((name, extension @ ("MPF" | "SPF"))) =
+        line.strip_prefix('%').and_then(|line| line.rsplit_once('_'))
+    {
         (name.to_owned(), extension.to_owned())
     } else if let Some(number) = line.strip_prefix("%SPF").and_then(number_text) {
         (format!("L{number}"), "SPF".to_owned())

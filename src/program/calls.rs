@@ -8,9 +8,7 @@ use super::dialect::Dialect;
 use super::expression::{arguments, expected, expression, unused_expression};
 use super::lexer::{Lexer, Token};
 use super::statements::{check_name, destination, keyword, variable_type};
-use super::syntax::{
-    Call, Callee, Expr, ExprKind, Header, Parameter, RepeatBlocks, Return, Statement, VariableType,
-};
+use super::syntax::{Call, Callee, Expr, ExprKind, Header, Parameter, RepeatBlocks, Return, Statement, VariableType};
 use super::words::{self, Role};
 use std::sync::Arc;
 
@@ -18,7 +16,16 @@ use std::sync::Arc;
 const PARAMETERS_MAX: usize = 127;
 /// Words behind the parameters of PROC that say nothing to a simulation.
 const ATTRIBUTES: [&str; 11] = [
-    "DISPLOF", "DISPLON", "SBLOF", "SBLON", "ACTBLOCNO", "PREPRO", "IPTRLOCK", "IPTRUNLOCK", "ICYCOF", "ICYCON",
+    "DISPLOF",
+    "DISPLON",
+    "SBLOF",
+    "SBLON",
+    "ACTBLOCNO",
+    "PREPRO",
+    "IPTRLOCK",
+    "IPTRUNLOCK",
+    "ICYCOF",
+    "ICYCON",
     "ASUP",
 ];
 
@@ -92,8 +99,9 @@ fn parameter(lexer: &mut Lexer, external: bool) -> Outcome<Parameter> {
             dimensions.push(None);
         }
         if dimensions.len() > super::statements::DIMENSIONS_MAX {
-            return Err(Fault::new(codes::BAD_INDEX, columns, "an array has at most three dimensions")
-                .label("too many"));
+            return Err(
+                Fault::new(codes::BAD_INDEX, columns, "an array has at most three dimensions").label("too many")
+            );
         }
     }
     if let VariableType::Text(length) = &mut variable_type {
@@ -122,7 +130,12 @@ fn check_parameter(name: &str, columns: &Columns) -> Outcome<()> {
 }
 
 /// The call of a sub-program by its name, if the word in front can be one: `NAME`, `NAME(1, 2)`, `NAME P3`, `L12 P=R1`.
-pub(super) fn call_by_name(name: &str, columns: Columns, lexer: &mut Lexer, dialect: &Dialect) -> Outcome<Option<Call>> {
+pub(super) fn call_by_name(
+    name: &str,
+    columns: Columns,
+    lexer: &mut Lexer,
+    dialect: &Dialect,
+) -> Outcome<Option<Call>> {
     let can_be_called = match name.as_bytes() {
         [b'L' | b'l', digits @ ..] if !digits.is_empty() && digits.iter().all(u8::is_ascii_digit) => true,
         [b'$', ..] | [_] => false,

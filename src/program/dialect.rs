@@ -2,7 +2,8 @@
 //!
 //! In: [`Machine`]. Out: [`Dialect`], by which the parser knows an axis word. Does not keep limits or units.
 
-use crate::base::AxisId;
+use super::words::role;
+use crate::base::{AxisId, Diagnostic};
 use crate::machine::Machine;
 
 /// Axis names of a machine.
@@ -12,6 +13,19 @@ pub struct Dialect {
     names: Vec<(String, AxisId)>,
     /// Axes with one letter, A to Z.
     letters: [Option<AxisId>; 26],
+}
+
+/// Axes whose name is a word of the language, as errors: a program could not name such an axis.
+pub fn taken_axis_names(machine: &Machine) -> Vec<Diagnostic> {
+    let taken = |name: &str| name.len() > 1 && role(name).is_some();
+    let names = machine.axis_ids().map(|id| machine.axis(id).name.as_str());
+    names
+        .filter(|name| taken(name))
+        .map(|name| {
+            let message = format!("the axis name {name} is taken: it is a word of NC programs");
+            Diagnostic::error("M0011", message).help("give the axis another name in the machine file")
+        })
+        .collect()
 }
 
 impl Dialect {

@@ -24,12 +24,12 @@ pub mod text;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
-pub use dialect::Dialect;
+pub use dialect::{Dialect, taken_axis_names};
 pub use library::{Library, Shipped, UnitId};
 pub use parser::{parse, whole_number};
 pub use source::{Cursor, Line, ProgramSource, Window};
 pub use statements::{TEXT_MAX, block_number, visit_names};
-pub use syntax::Block;
+pub use syntax::{Block, VariableType};
 pub use text::ProgramText;
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 

@@ -131,7 +131,7 @@ fn block_words(lexer: &mut Lexer, dialect: &Dialect) -> Outcome<Vec<Word>> {
     while !lexer.at_end() {
         let start = lexer.position();
         let behind_digit = lexer.is_behind_digit();
-        let kind = WordParser { lexer, dialect, start, first: found.is_empty(), behind_digit }.word()?;
+        let kind = WordParser { lexer, dialect, start, behind_digit }.word()?;
         found.push(Word { columns: lexer.columns_from(start), kind });
     }
     Ok(found)
@@ -142,7 +142,6 @@ struct WordParser<'l, 'a, 'd> {
     lexer: &'l mut Lexer<'a>,
     dialect: &'d Dialect,
     start: usize,
-    first: bool,
     /// The byte before it is a digit or a point.
     behind_digit: bool,
 }

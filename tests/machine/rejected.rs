@@ -221,14 +221,15 @@ fn axis_names() {
         ("M1", "M is a machine function"),
         ("R", "R parameter"),
         ("x", "write [axes.X]"),
-        ("XY", "capital letter"),
+        ("Xy", "capital letter"),
+        ("X_Y", "capital letter"),
         ("1", "capital letter"),
         ("\"Ä\"", "capital letter"),
         ("\"\"", "capital letter"),
     ] {
         assert_says(&only_error(&with(MINIMAL, "[axes.X]", &format!("[axes.{name}]"))), &[words]);
     }
-    for name in ["X", "Z2", "X1", "U", "C"] {
+    for name in ["X", "Z2", "X1", "U", "C", "XY", "ELX", "SP_1"] {
         assert!(parse(&with(MINIMAL, "[axes.X]", &format!("[axes.{name}]"))).is_ok(), "{name} is refused");
     }
 }
@@ -331,9 +332,6 @@ fn dynamics_sets_are_kept_and_not_acted_on() {
 fn values_of_later_versions_are_refused_by_name() {
     let later = [
         ("time_law = \"continuous\"", "time_law = \"continuous\"", "feed.time_law"),
-        ("\"G642\"", "\"G643\"", "feed.default_path_mode = \"G643\""),
-        ("\"G642\"", "\"G644\"", "feed.default_path_mode = \"G644\""),
-        ("\"G642\"", "\"G645\"", "feed.default_path_mode = \"G645\""),
         ("\"signed\"", "\"printed\"", "feed.curvature_jump = \"printed\""),
         ("\"worst\"", "\"printed\"", "feed.arc_limits = \"printed\""),
         ("blend_law = \"limits\"", "blend_law = \"published\"", "smoothing.blend_law = \"published\""),
