@@ -49,7 +49,7 @@ fn jumps_to_labels_numbers_and_computed_targets() {
     assert_eq!(xs("G0 X1\nIF FALSE GOTOF NOWHERE\nX2"), [1.0, 2.0]);
     assert_eq!(run("G0 X1\nGOTOF NOWHERE").alarm().code, codes::NO_TARGET);
     // Of equal labels the nearest counts, in both directions.
-    let twice = "GOTOF A\nG0 X1\nA: R1=R1+1 G0 X2\nIF R1>1 GOTOF FIN\nGOTOB A\nA: X4\nFIN: X5";
+    let twice = "GOTOF AA\nG0 X1\nAA: R1=R1+1 G0 X2\nIF R1>1 GOTOF FIN\nGOTOB AA\nAA: X4\nFIN: X5";
     assert_eq!(xs(twice), [2.0, 2.0, 5.0]);
 }
 
@@ -65,23 +65,23 @@ fn jumps_into_loops_and_out_of_them() {
 #[test]
 fn parts_are_repeated() {
     // From the label to REPEAT: three passes more.
-    assert_eq!(xs("G0 X0\nA: R1=R1+1\nX=R1\nREPEAT A P=3\nX9"), [0.0, 1.0, 2.0, 3.0, 4.0, 9.0]);
-    assert_eq!(xs("G0 X0\nA: R1=R1+1\nX=R1\nREPEAT A P3\nX9"), [0.0, 1.0, 2.0, 3.0, 4.0, 9.0]);
-    assert_eq!(xs("A: R1=R1+1\nG0 X=R1\nREPEAT A\nX9"), [1.0, 2.0, 9.0]);
+    assert_eq!(xs("G0 X0\nAA: R1=R1+1\nX=R1\nREPEAT AA P=3\nX9"), [0.0, 1.0, 2.0, 3.0, 4.0, 9.0]);
+    assert_eq!(xs("G0 X0\nAA: R1=R1+1\nX=R1\nREPEAT AA P3\nX9"), [0.0, 1.0, 2.0, 3.0, 4.0, 9.0]);
+    assert_eq!(xs("AA: R1=R1+1\nG0 X=R1\nREPEAT AA\nX9"), [1.0, 2.0, 9.0]);
     // To ENDLABEL, whose block belongs to it.
-    assert_eq!(xs("A: G0 X1\nENDLABEL: X2\nX3\nREPEAT A P2"), [1.0, 2.0, 3.0, 1.0, 2.0, 1.0, 2.0]);
+    assert_eq!(xs("AA: G0 X1\nENDLABEL: X2\nX3\nREPEAT AA P2"), [1.0, 2.0, 3.0, 1.0, 2.0, 1.0, 2.0]);
     // Between two labels, before REPEAT and behind it.
-    assert_eq!(xs("A: G0 X1\nB: X2\nX3\nREPEAT A B"), [1.0, 2.0, 3.0, 1.0, 2.0]);
-    assert_eq!(xs("G0 X0\nREPEAT A B P2\nM30\nA: X1\nB: X2\nX3"), [0.0, 1.0, 2.0, 1.0, 2.0]);
+    assert_eq!(xs("AA: G0 X1\nBB: X2\nX3\nREPEAT AA BB"), [1.0, 2.0, 3.0, 1.0, 2.0]);
+    assert_eq!(xs("G0 X0\nREPEAT AA BB P2\nM30\nAA: X1\nBB: X2\nX3"), [0.0, 1.0, 2.0, 1.0, 2.0]);
     // One block.
-    assert_eq!(xs("A: G91 G0 X1\nX10\nREPEATB A P=2\nX100"), [1.0, 11.0, 12.0, 13.0, 113.0]);
+    assert_eq!(xs("AA: G91 G0 X1\nX10\nREPEATB AA P=2\nX100"), [1.0, 11.0, 12.0, 13.0, 113.0]);
     // Nested, and as often as a variable says.
-    assert_eq!(xs("R5=1\nA: G91 G0 X1\nREPEATB A P=R5\nB: X10\nREPEAT A P=1"), [1.0, 2.0, 12.0, 13.0, 14.0, 24.0]);
+    assert_eq!(xs("R5=1\nAA: G91 G0 X1\nREPEATB AA P=R5\nBB: X10\nREPEAT AA P=1"), [1.0, 2.0, 12.0, 13.0, 14.0, 24.0]);
     // A jump out of the part ends it: FIN is reached once.
-    assert_eq!(xs("A: R1=R1+1 G0 X=R1\nIF R1==3 GOTOF FIN\nREPEAT A P9\nX50\nFIN: X9"), [1.0, 2.0, 3.0, 9.0]);
-    assert_eq!(xs("A: G0 X1\nREPEAT A P=0\nX2"), [1.0, 2.0]);
+    assert_eq!(xs("AA: R1=R1+1 G0 X=R1\nIF R1==3 GOTOF FIN\nREPEAT AA P9\nX50\nFIN: X9"), [1.0, 2.0, 3.0, 9.0]);
+    assert_eq!(xs("AA: G0 X1\nREPEAT AA P=0\nX2"), [1.0, 2.0]);
     assert_eq!(run("G0 X1\nREPEAT NOWHERE").alarm().code, codes::NO_TARGET);
-    assert_eq!(run("REPEAT A\nM30\nA: G0 X1").alarm().code, codes::NO_TARGET);
+    assert_eq!(run("REPEAT AA\nM30\nAA: G0 X1").alarm().code, codes::NO_TARGET);
 }
 
 #[test]

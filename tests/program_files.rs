@@ -40,13 +40,13 @@ fn listing(source: &ProgramSource) -> String {
 #[test]
 fn a_streamed_program_gives_the_same_moves() {
     // Longer than several windows; jumps in both directions and a loop across a window's border.
-    let mut text = String::from("\u{feff}DEF INT I\nG1 F1000\nGOTOF FAR\nNEAR: MSG(\"näher\")\nX1\nGOTOF N99999\n");
+    let mut text = String::from("\u{feff}DEF INT COUNT\nG1 F1000\nGOTOF FAR\nNEAR: MSG(\"näher\")\nX1\nGOTOF N99999\n");
     for i in 0..40_000 {
         writeln!(text, "N{} X{}.5 Y{} ; a comment", i, i % 400, i % 7).unwrap();
     }
-    text += "FAR: X0\nFOR I=1 TO 3\n";
+    text += "FAR: X0\nFOR COUNT=1 TO 3\n";
     for i in 0..3_000 {
-        writeln!(text, "X{} Y=I\r", i % 300).unwrap();
+        writeln!(text, "X{} Y=COUNT\r", i % 300).unwrap();
     }
     text += "ENDFOR\nGOTOB NEAR\nN99999 Z=SIN(30)\nM30";
     let path = file("long.mpf", text.as_bytes());

@@ -130,8 +130,8 @@ HOLES(2)
 L12 P2
 M30
 %_N_HOLES_SPF
-PROC HOLES(INT N)
-FOR R1=1 TO N
+PROC HOLES(INT COUNT)
+FOR R1=1 TO COUNT
 G0 X=R1
 ENDFOR
 M17
@@ -187,41 +187,41 @@ M30
 #[test]
 fn arrays_are_handed_over_whole() {
     let sub = "\
-PROC SUM(REAL A[3], VAR REAL B[], VAR REAL TOTAL, INT M[2,2])
-DEF INT I
-FOR I=0 TO 2
-TOTAL=TOTAL+A[I]
-A[I]=0
-B[I]=I*10
+PROC SUM(REAL AA[3], VAR REAL BB[], VAR REAL TOTAL, INT MM[2,2])
+DEF INT II
+FOR II=0 TO 2
+TOTAL=TOTAL+AA[II]
+AA[II]=0
+BB[II]=II*10
 ENDFOR
-TOTAL=TOTAL+M[1,1]
+TOTAL=TOTAL+MM[1,1]
 RET
 ";
     let main = "\
-DEF REAL A[3]=SET(1,2,3), B[3], TOTAL[2]
-DEF INT M[2,2]
-M[1,1]=100
-SUM(A, B, TOTAL[1], M)
+DEF REAL AA[3]=SET(1,2,3), BB[3], TOTAL[2]
+DEF INT MM[2,2]
+MM[1,1]=100
+SUM(AA, BB, TOTAL[1], MM)
 G0 X=TOTAL[1]
-X=A[2]
-X=B[2]
+X=AA[2]
+X=BB[2]
 X=TOTAL[0]
 M30
 ";
     assert_eq!(xs_of("arrays", &[("main.mpf", main), ("SUM.SPF", sub)]), [106.0, 3.0, 20.0, 0.0]);
-    let wrong = main.replace("A[3]=SET(1,2,3)", "A[4]");
+    let wrong = main.replace("AA[3]=SET(1,2,3)", "AA[4]");
     assert_eq!(alarm_of("wrong_size", &[("main.mpf", &wrong), ("SUM.SPF", sub)]).code, codes::BAD_ARGUMENT);
 }
 
 #[test]
 fn every_program_has_variables_of_its_own() {
     let files = [
-        ("main.mpf", "DEF INT N=5\nR1=1\nSUB\nG0 X=N\nX=R1\nSUB\nX=R1\nM30"),
+        ("main.mpf", "DEF INT NN=5\nR1=1\nSUB\nG0 X=NN\nX=R1\nSUB\nX=R1\nM30"),
         // A DEF acts in every call; R parameters are common to all.
-        ("SUB.SPF", "DEF INT N\nN=N+1\nR1=R1+N\nG0 X=N\nRET"),
+        ("SUB.SPF", "DEF INT NN\nNN=NN+1\nR1=R1+NN\nG0 X=NN\nRET"),
     ];
     assert_eq!(xs_of("own", &files), [1.0, 5.0, 2.0, 1.0, 3.0]);
-    let unseen = [("main.mpf", "DEF INT N=5\nSUB\nM30"), ("SUB.SPF", "G0 X=N\nRET")];
+    let unseen = [("main.mpf", "DEF INT NN=5\nSUB\nM30"), ("SUB.SPF", "G0 X=NN\nRET")];
     let alarm = alarm_of("unseen", &unseen);
     assert_eq!((alarm.code, alarm.line()), (codes::UNDECLARED, 1));
     let place = alarm.place.as_ref().unwrap();
@@ -259,8 +259,8 @@ M30
 
 #[test]
 fn a_part_of_a_program_is_called() {
-    let sub = "G0 X1\nBEGIN: X2\nX3\nFIN: X4\nX5\nRET\n";
-    let main = "CALL \"SUB\" BLOCK BEGIN TO FIN\nG0 X10\nCALL BLOCK A TO B\nM30\nA: X20\nB: X21\nX22\n";
+    let sub = "G0 X1\nBEGIN: G0 X2\nX3\nFIN: X4\nX5\nRET\n";
+    let main = "CALL \"SUB\" BLOCK BEGIN TO FIN\nG0 X10\nCALL BLOCK AA TO BB\nM30\nAA: X20\nBB: X21\nX22\n";
     assert_eq!(xs_of("block", &[("main.mpf", main), ("SUB.SPF", sub)]), [2.0, 3.0, 4.0, 10.0, 20.0, 21.0]);
 }
 
@@ -360,7 +360,7 @@ fn what_goes_wrong_is_said() {
     for (i, (call, code)) in [
         ("SUB(1,2)", codes::BAD_ARGUMENT),
         ("SUB(1,R1,3)", codes::BAD_ARGUMENT),
-        ("DEF INT N\nSUB(1,N)", codes::BAD_ARGUMENT),
+        ("DEF INT NN\nSUB(1,NN)", codes::BAD_ARGUMENT),
         ("SUB(\"a\")", codes::TYPE_MISMATCH),
         ("SUB P0", codes::OUT_OF_RANGE),
         ("SUB P10000", codes::OUT_OF_RANGE),

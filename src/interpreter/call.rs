@@ -510,12 +510,15 @@ pub(super) fn missing<'a>(
     names: impl Iterator<Item = &'a str> + Clone,
     columns: &Columns,
 ) -> Box<Fault> {
-    if may_be_word && let Some(help) = did_you_mean(name) {
+    let near = nearest(&name.to_ascii_uppercase(), names).map(|near| format!("did you mean `{near}`?"));
+    if may_be_word
+        && near.is_none()
+        && let Some(help) = did_you_mean(name)
+    {
         return Fault::new(codes::UNKNOWN_WORD, columns.clone(), format!("unknown word `{name}`"))
             .label("neither a word of the language nor a sub-program")
             .help(help);
     }
-    let near = nearest(&name.to_ascii_uppercase(), names).map(|near| format!("did you mean `{near}`?"));
     let otherwise = "put it beside the program, or give its folder with -I FOLDER".to_owned();
     Fault::new(codes::NO_SUBPROGRAMS, columns.clone(), format!("there is no sub-program `{name}`"))
         .label("not found")

@@ -118,6 +118,8 @@ fn label(lexer: &mut Lexer) -> Option<std::sync::Arc<str>> {
     if let Some(name) = name
         && name.len() > 1
         && lexer.peek_byte() == Some(b':')
+        // `GOTOF :90` leads to a main block.
+        && !matches!(words::role(name), Some(Role::Control(_)))
     {
         lexer.skip_byte();
         return Some(name.to_ascii_uppercase().into());

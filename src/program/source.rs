@@ -60,10 +60,16 @@ pub struct Window {
 }
 
 /// Bytes of a line without its line end.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Line {
     bytes: Arc<[u8]>,
     range: Range<usize>,
+}
+
+impl std::fmt::Debug for Line {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        String::from_utf8_lossy(self).fmt(formatter)
+    }
 }
 
 impl Deref for Line {
@@ -205,7 +211,7 @@ impl ProgramSource {
                 return Err(Fault::new(codes::BAD_BLOCK, 0..0, "this line is too long to be a block")
                     .label(format!("expected a line end within {LINE_BYTES_MAX} bytes")));
             }
-            length *= 4;
+            length = (4 * length).min(LINE_BYTES_MAX);
         }
     }
 
