@@ -36,6 +36,9 @@ fn folder(name: &str) -> PathBuf {
         fs::create_dir_all(folder.join(part)).expect("a new folder");
         for entry in fs::read_dir(Path::new(ROOT).join(part)).unwrap_or_else(|error| panic!("{part}: {error}")) {
             let entry = entry.expect("a file");
+            if entry.path().is_dir() {
+                continue;
+            }
             fs::copy(entry.path(), folder.join(part).join(entry.file_name())).expect("a copy");
         }
     }

@@ -5,6 +5,7 @@
 
 mod check;
 mod demo;
+mod explain;
 mod export;
 mod failure;
 mod follow;
@@ -59,6 +60,8 @@ enum Command {
     Recover(recover::RecoverArguments),
     /// Machine files: check, list, show, schema
     Machine(machine::MachineArguments),
+    /// What a code such as E0104 means, and what to do
+    Explain(explain::ExplainArguments),
     /// Write a program and a machine to look at, and run them
     Demo(demo::DemoArguments),
 }
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => (export::export(arguments), arguments.json),
         Command::Recover(arguments) => (recover::recover(arguments), arguments.json),
         Command::Machine(arguments) => (machine::machine(arguments), arguments.json()),
+        Command::Explain(arguments) => (explain::explain(arguments), arguments.json),
         Command::Demo(arguments) => (demo::demo(arguments), arguments.json),
     };
     match done {

@@ -5,8 +5,8 @@
 use super::failure::Failure;
 use super::inputs::{MachineChoice, Surroundings};
 use super::output::{show, written};
-use crate::base::{AxisKind, PartPoint, units};
-use crate::interpreter::{Interpreter, Listing, Move, MoveKind, feed_per_minute, kind_name};
+use crate::base::{AxisKind, Diagnostic, PartPoint, Severity, units};
+use crate::interpreter::{Interpreter, Listing, Move, MoveKind, Setup, feed_per_minute, kind_name};
 use crate::machine::Machine;
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -29,7 +29,7 @@ pub(super) struct MovesArguments {
 
 pub(super) fn moves(arguments: &MovesArguments) -> Result<(), Failure> {
     let loaded = arguments.machine.load()?;
-    let setup = arguments.surroundings.open(&arguments.program)?;
+    let setup = Setup { lists_only: true, ..arguments.surroundings.open(&arguments.program)? };
     let mut interpreter = Interpreter::new(setup, &loaded.machine);
     let mut listing = Listing::new(&loaded.machine);
     // Streamed: the program may have ten million blocks. A closed pipe is the reader's way to say "enough".
@@ -55,22 +55,28 @@ pub(super) fn moves(arguments: &MovesArguments) -> Result<(), Failure> {
             Err(alarm) => break Some(alarm),
         }
     };
-    let warnings = interpreter.take_warnings();
+    let (errors, warnings): (Vec<_>, Vec<_>) =
+        interpreter.take_warnings().into_iter().partition(|finding| finding.severity == Severity::Error);
     if arguments.json {
-        let listed: Vec<Value> = warnings.iter().map(|finding| json!(crate::kernel::Warning::from(finding))).collect();
+        let list = |findings: &[Diagnostic]| -> Value {
+            findings.iter().map(|finding| json!(crate::kernel::Warning::from(finding))).collect()
+        };
         let ended = alarm.as_ref().map_or(String::new(), |alarm| {
             format!(", \"alarm\": {}", json!(crate::kernel::Warning::from(alarm.as_ref())))
         });
-        done = done.and_then(|()| writeln!(out, "\n], \"warnings\": {}{ended}}}", Value::Array(listed)));
+        done = done.and_then(|()| {
+            writeln!(out, "\n], \"warnings\": {}, \"errors\": {}{ended}}}", list(&warnings), list(&errors))
+        });
     }
     done = done.and_then(|()| out.flush());
     drop(out);
     show(&warnings);
+    show(&errors);
     if let Some(alarm) = &alarm {
         show([alarm.as_ref()]);
     }
     written(done)?;
-    if alarm.is_some() { Err(Failure::told()) } else { Ok(()) }
+    if alarm.is_some() || !errors.is_empty() { Err(Failure::told()) } else { Ok(()) }
 }
 
 /// `feed_mm_min` is null for rapids, and deg/min where only rotary axes move.

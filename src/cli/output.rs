@@ -3,7 +3,7 @@
 //! In: diagnostics, documents, rows. Out: text on stdout and stderr. A closed pipe (`sollwert moves x | head`) ends output quietly.
 
 use super::failure::Failure;
-use crate::base::Diagnostic;
+use crate::base::{Diagnostic, Severity};
 use serde::Serialize;
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -12,9 +12,16 @@ use std::time::{Duration, Instant};
 pub(super) fn show<'a>(findings: impl IntoIterator<Item = &'a Diagnostic>) {
     let colour = stderr_colour();
     let mut stderr = std::io::stderr().lock();
+    let mut first_error = None;
     for finding in findings {
         // Nothing is left to do when stderr is gone.
         let _ = writeln!(stderr, "{}", finding.render(colour));
+        if finding.severity == Severity::Error {
+            first_error = first_error.or(Some(finding.code));
+        }
+    }
+    if let Some(code) = first_error {
+        let _ = writeln!(stderr, "`sollwert explain {code}` says more about this.");
     }
 }
 

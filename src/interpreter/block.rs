@@ -63,6 +63,7 @@ impl Interpreter {
         for word in words {
             self.word(word, &mut block)?;
         }
+        block.events.append(&mut self.trace_events);
         if let Some(columns) = block.dwell.take() {
             self.dwell(&mut block, &columns)?;
         } else {
@@ -73,7 +74,7 @@ impl Interpreter {
             self.act(&mut block)?;
         }
         if block.stops {
-            self.emit_function(Vec::new(), true);
+            self.emit(MoveKind::StopPreparation, self.standing_feed(), false, Vec::new());
         }
         if !block.last.is_empty() {
             self.emit_function(block.last, true);
@@ -117,24 +118,24 @@ impl Interpreter {
             WordKind::Keyword(keyword) => self.keyword(*keyword, columns, block),
             WordKind::Message(text) => {
                 let text = match text {
-                    Some(text) => evaluate(text, &self.variables)?.text(),
+                    Some(text) => self.text_of(&evaluate(text, self)?, &text.columns)?,
                     None => "".into(),
                 };
                 block.events.push(Event::Message(text));
                 Ok(())
             }
             WordKind::Assign(target, value) => {
-                let result = evaluate(value, &self.variables)?;
+                let result = evaluate(value, self)?;
                 self.assign(target, &result, columns, &value.columns)
             }
             WordKind::Fill(target, filling) => match target {
                 Target::Variable { name, indices } => {
-                    let indices = integers(indices, &self.variables)?;
+                    let indices = integers(indices, self)?;
                     self.fill(name, &indices, filling, columns)
                 }
-                Target::Parameter(_) => {
+                Target::Parameter(_) | Target::System(_) => {
                     Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "SET and REP fill arrays")
-                        .label("an R parameter is none"))
+                        .label("this is none"))
                 }
             },
             WordKind::Indexed { address, index, values } => {
@@ -264,7 +265,7 @@ impl Interpreter {
             block.events.push(tool);
             return Ok(());
         }
-        let typed = Typed(number(&value.value, &self.variables)?);
+        let typed = Typed(number(&value.value, self)?);
         let has_form = matches!(
             address,
             Address::Axis(_)
@@ -348,7 +349,7 @@ impl Interpreter {
 
     /// Name of the tool, or its number as text.
     fn tool(&self, value: &AddressValue) -> Outcome<Arc<str>> {
-        Ok(match evaluate(&value.value, &self.variables)? {
+        Ok(match evaluate(&value.value, self)? {
             Value::Text(text) => text,
             number => whole(Typed(number.number(&value.value.columns)?), &value.value.columns, "T")?.to_string().into(),
         })

@@ -45,7 +45,7 @@ pub(super) struct Waiting {
     /// The call.
     current: Cursor,
     next: Cursor,
-    memory: Memory,
+    known: Memory,
     repeats: Vec<Repeat>,
     /// Parameters of the called program that are variables here.
     by_reference: Vec<(Arc<str>, Target, Columns)>,
@@ -157,7 +157,7 @@ impl Interpreter {
     /// P of a call or a repetition.
     pub(super) fn passes(&mut self, passes: Option<&Expr>, least: i32) -> Outcome<i32> {
         let Some(passes) = passes else { return Ok(1) };
-        let number = evaluate(passes, &self.variables)?.integer(&passes.columns)?;
+        let number = evaluate(passes, self)?.integer(&passes.columns)?;
         if (least..=PASSES_MAX).contains(&number) {
             return Ok(number);
         }
@@ -168,7 +168,7 @@ impl Interpreter {
     fn callee(&mut self, call: &Call) -> Outcome<UnitId> {
         let name: Arc<str> = match &call.callee {
             Callee::Name(name) | Callee::Path(name) => name.clone(),
-            Callee::Text(text) => match evaluate(text, &self.variables)? {
+            Callee::Text(text) => match evaluate(text, self)? {
                 Value::Text(name) => name,
                 _ => {
                     return Err(Fault::new(
@@ -258,7 +258,7 @@ impl Interpreter {
                     whole.converted(kept, head.line, &argument.columns)?
                 }
                 Some(argument) if parameter.dimensions.is_empty() => {
-                    let value = evaluate(argument, &self.variables)?;
+                    let value = evaluate(argument, self)?;
                     Whole::of(parameter.variable_type, Some(&value), head.line, &argument.columns)?
                 }
                 Some(argument) => {
@@ -273,13 +273,13 @@ impl Interpreter {
 
     fn default_of(&mut self, parameter: &Parameter, line: u32, columns: &Columns) -> Outcome<Whole> {
         let value = match &parameter.default {
-            Some(value) => Some(evaluate(value, &self.variables)?),
+            Some(value) => Some(evaluate(value, self)?),
             None => None,
         };
         let mut sizes = Vec::new();
         for size in &parameter.dimensions {
             sizes.push(match size {
-                Some(size) => evaluate(size, &self.variables)?.integer(columns)?,
+                Some(size) => evaluate(size, self)?.integer(columns)?,
                 None => 1,
             });
         }
@@ -291,14 +291,14 @@ impl Interpreter {
         let constant = |value: i32| Expr { columns: argument.columns.clone(), kind: ExprKind::Int(value) };
         let (target, whole) = match &argument.kind {
             ExprKind::Parameter(index) => {
-                let number = evaluate(index, &self.variables)?.integer(&index.columns)?;
+                let number = evaluate(index, self)?.integer(&index.columns)?;
                 let value = Value::Real(self.variables.parameter(number, &argument.columns)?);
                 let whole = Whole::of(VariableType::Real, Some(&value), 0, &argument.columns)?;
                 (Target::Parameter(constant(number)), whole)
             }
             ExprKind::Variable { name, indices } => {
                 let whole = self.variables.whole(name, &argument.columns)?;
-                let places = integers(indices, &self.variables)?;
+                let places = integers(indices, self)?;
                 let whole = if places.is_empty() {
                     whole
                 } else {
@@ -344,7 +344,7 @@ impl Interpreter {
         let mut fits = whole.dimensions().len() == parameter.dimensions.len();
         for (size, wanted) in whole.dimensions().iter().zip(&parameter.dimensions) {
             if let Some(wanted) = wanted {
-                let wanted = evaluate(wanted, &self.variables)?.integer(columns)?;
+                let wanted = evaluate(wanted, self)?.integer(columns)?;
                 fits &= usize::try_from(wanted) == Ok(*size);
             }
         }
@@ -388,7 +388,7 @@ impl Interpreter {
             window: std::mem::take(&mut self.window),
             current: self.current,
             next: std::mem::replace(&mut self.next, head.body),
-            memory: std::mem::replace(&mut self.memory, memory),
+            known: std::mem::replace(&mut self.known, memory),
             repeats: std::mem::take(&mut self.repeats),
             by_reference: given.by_reference,
             saved: given.save.then(|| Box::new(self.modal.clone())),
@@ -426,7 +426,7 @@ impl Interpreter {
         for (name, target, columns) in level.by_reference {
             handed_back.push((target, self.variables.whole(&name, &columns)?, columns));
         }
-        let memory = std::mem::replace(&mut self.memory, level.memory);
+        let memory = std::mem::replace(&mut self.known, level.known);
         self.shelf.insert(std::mem::replace(&mut self.unit, level.unit), memory);
         self.program = level.program;
         self.source = level.source;
@@ -454,7 +454,7 @@ impl Interpreter {
     pub(super) fn return_from(&mut self, wanted: &Return) -> Outcome<()> {
         let target = match &wanted.target {
             None => None,
-            Some(target) => match evaluate(target, &self.variables)? {
+            Some(target) => match evaluate(target, self)? {
                 Value::Text(text) => Some(text),
                 number => Some(Arc::from(format!("N{}", number.integer(&target.columns)?))),
             },
@@ -464,7 +464,7 @@ impl Interpreter {
         let levels = match &wanted.levels {
             None => 1,
             Some(levels) => {
-                let number = evaluate(levels, &self.variables)?.integer(&levels.columns)?;
+                let number = evaluate(levels, self)?.integer(&levels.columns)?;
                 usize::try_from(number).ok().filter(|number| (1..LEVELS_MAX).contains(number)).ok_or_else(|| {
                     Fault::new(codes::OUT_OF_RANGE, levels.columns.clone(), format!("{number} levels are not possible"))
                         .label(format!("expected 1 to {}", LEVELS_MAX - 1))
@@ -494,7 +494,7 @@ impl Interpreter {
     }
 
     fn flag(&mut self, value: Option<&Expr>) -> Outcome<bool> {
-        value.map_or(Ok(false), |value| evaluate(value, &self.variables)?.truth(&value.columns))
+        value.map_or(Ok(false), |value| evaluate(value, self)?.truth(&value.columns))
     }
 
     /// Where the waiting programs stand, innermost first: file and line of each call.

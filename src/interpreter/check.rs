@@ -31,7 +31,7 @@ const PROGRAMS_MAX: usize = 1000;
 
 /// All diagnostics of a program and of the sub-programs that its calls name, on `machine`.
 pub fn check(setup: impl Into<Setup>, machine: &Machine) -> Vec<Diagnostic> {
-    let setup = setup.into();
+    let setup = Setup { lists_only: true, ..setup.into() };
     let dialect = Dialect::new(machine);
     let mut library = Library::new(setup.program.clone(), setup.directories.clone(), setup.shipped);
     let units = reachable(&mut library, &dialect);
@@ -261,6 +261,7 @@ fn visit_target(target: &Target, columns: &Columns, visit: &mut impl FnMut(&Arc<
             visit(name, &(columns.start..end));
             indices.iter().for_each(|index| visit_names(index, visit));
         }
+        Target::System(system) => system.indices.iter().for_each(|index| visit_names(index, visit)),
     }
 }
 

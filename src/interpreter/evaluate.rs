@@ -4,16 +4,18 @@
 //! control: `/` is always REAL, DIV and MOD truncate. An INT result outside 32 bits goes on as REAL; only storing it in an INT is
 //! an alarm. AND, OR, XOR take both sides (no short cut).
 
+use super::run::Interpreter;
+use super::strings::text_function;
 use super::value::Value;
-use super::variables::Variables;
 use crate::base::units::{deg_from_rad, rad_from_deg};
 use crate::program::syntax::{Binary, Expr, ExprKind, Unary};
 use crate::program::words::Function;
 use crate::program::{Columns, Fault, Outcome, TEXT_MAX, codes};
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 /// Evaluates `expression`.
-pub fn evaluate(expression: &Expr, variables: &Variables) -> Outcome<Value> {
+pub fn evaluate(expression: &Expr, context: &Interpreter) -> Outcome<Value> {
     let columns = &expression.columns;
     match &expression.kind {
         ExprKind::Bool(value) => Ok(Value::Bool(*value)),
@@ -21,35 +23,45 @@ pub fn evaluate(expression: &Expr, variables: &Variables) -> Outcome<Value> {
         ExprKind::Real(value) => Ok(Value::Real(*value)),
         ExprKind::Text(text) => Ok(Value::Text(text.clone())),
         ExprKind::Parameter(index) => {
-            let number = evaluate(index, variables)?.integer(&index.columns)?;
-            variables.parameter(number, columns).map(Value::Real)
+            let number = evaluate(index, context)?.integer(&index.columns)?;
+            context.variables.parameter(number, columns).map(Value::Real)
         }
-        ExprKind::Variable { name, indices } => {
-            let indices = integers(indices, variables)?;
-            variables.get(name, &indices, columns)
-        }
-        ExprKind::Unary(operator, operand) => unary(*operator, evaluate(operand, variables)?, columns),
+        ExprKind::Variable { name, indices } => variable(name, indices, context, columns),
+        ExprKind::System(system) => context.system_variable(system, columns),
+        ExprKind::Unary(operator, operand) => unary(*operator, evaluate(operand, context)?, columns),
         ExprKind::Binary(operator, operands) => {
-            let (left, right) = (evaluate(&operands.0, variables)?, evaluate(&operands.1, variables)?);
-            binary(*operator, &left, &right, operands, columns)
+            let (left, right) = (evaluate(&operands.0, context)?, evaluate(&operands.1, context)?);
+            binary(*operator, &left, &right, operands, context, columns)
         }
-        ExprKind::Call(function, arguments) => call(*function, arguments, variables, columns),
+        ExprKind::Call(function, arguments) => call(*function, arguments, context, columns),
     }
 }
 
 /// Evaluates to a number.
-pub fn number(expression: &Expr, variables: &Variables) -> Outcome<f64> {
+pub fn number(expression: &Expr, context: &Interpreter) -> Outcome<f64> {
     // The plain number of most words needs no detour over `Value`.
     match expression.kind {
         ExprKind::Real(value) => Ok(value),
         ExprKind::Int(value) => Ok(f64::from(value)),
-        _ => evaluate(expression, variables)?.number(&expression.columns),
+        _ => evaluate(expression, context)?.number(&expression.columns),
     }
 }
 
 /// Evaluates a list of indices.
-pub fn integers(expressions: &[Expr], variables: &Variables) -> Outcome<Vec<i32>> {
-    expressions.iter().map(|index| evaluate(index, variables)?.integer(&index.columns)).collect()
+pub fn integers(expressions: &[Expr], context: &Interpreter) -> Outcome<Vec<i32>> {
+    expressions.iter().map(|index| evaluate(index, context)?.integer(&index.columns)).collect()
+}
+
+/// A variable, a character of one, or the name of an axis.
+fn variable(name: &Arc<str>, indices: &[Expr], context: &Interpreter, columns: &Columns) -> Outcome<Value> {
+    if indices.is_empty()
+        && !context.variables.is_declared(name)
+        && let Some(axis) = context.dialect.axis(name)
+    {
+        return Ok(Value::Axis(Some(axis)));
+    }
+    let indices = integers(indices, context)?;
+    context.variables.get(name, &indices, columns)
 }
 
 fn finite(value: f64, columns: &Columns) -> Outcome<Value> {
@@ -77,7 +89,14 @@ fn unary(operator: Unary, operand: Value, columns: &Columns) -> Outcome<Value> {
     }
 }
 
-fn binary(operator: Binary, left: &Value, right: &Value, operands: &(Expr, Expr), columns: &Columns) -> Outcome<Value> {
+fn binary(
+    operator: Binary,
+    left: &Value,
+    right: &Value,
+    operands: &(Expr, Expr),
+    context: &Interpreter,
+    columns: &Columns,
+) -> Outcome<Value> {
     let (left_columns, right_columns) = (&operands.0.columns, &operands.1.columns);
     let numbers = || Ok::<_, Box<Fault>>((left.number(left_columns)?, right.number(right_columns)?));
     let integers = || Ok::<_, Box<Fault>>((left.integer(left_columns)?, right.integer(right_columns)?));
@@ -111,7 +130,8 @@ fn binary(operator: Binary, left: &Value, right: &Value, operands: &(Expr, Expr)
         Binary::And => truths().map(|(a, b)| Value::Bool(a && b)),
         Binary::Xor => truths().map(|(a, b)| Value::Bool(a != b)),
         Binary::Or => truths().map(|(a, b)| Value::Bool(a || b)),
-        Binary::Join => join(left, right, columns),
+        Binary::Chain => chain(left, right, columns),
+        Binary::Join => join(left, right, context, columns),
         Binary::Equal => compared(Ordering::is_eq),
         Binary::Unequal => compared(Ordering::is_ne),
         Binary::Greater => compared(Ordering::is_gt),
@@ -148,8 +168,13 @@ fn divide(
     }
 }
 
-fn join(left: &Value, right: &Value, columns: &Columns) -> Outcome<Value> {
-    let text = format!("{}{}", left.text(), right.text());
+/// `:` joins frames.
+fn chain(_left: &Value, _right: &Value, columns: &Columns) -> Outcome<Value> {
+    Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "`:` chains frames").label("expected frames on both sides"))
+}
+
+fn join(left: &Value, right: &Value, context: &Interpreter, columns: &Columns) -> Outcome<Value> {
+    let text = format!("{}{}", context.text_of(left, columns)?, context.text_of(right, columns)?);
     if text.chars().count() > usize::from(TEXT_MAX) {
         return Err(Fault::new(
             codes::TEXT_TOO_LONG,
@@ -161,10 +186,13 @@ fn join(left: &Value, right: &Value, columns: &Columns) -> Outcome<Value> {
     Ok(Value::Text(text.into()))
 }
 
-fn call(function: Function, arguments: &[Expr], variables: &Variables, columns: &Columns) -> Outcome<Value> {
+fn call(function: Function, arguments: &[Expr], context: &Interpreter, columns: &Columns) -> Outcome<Value> {
+    if let Some(result) = text_function(function, arguments, context, columns) {
+        return result;
+    }
     let mut values = [0.0; 3];
     for (value, argument) in values.iter_mut().zip(arguments) {
-        *value = number(argument, variables)?;
+        *value = number(argument, context)?;
     }
     let [a, b, c] = values;
     let outside = |needed: &str| {
@@ -195,6 +223,8 @@ fn call(function: Function, arguments: &[Expr], variables: &Variables, columns: 
         Function::MaxVal => a.max(b),
         Function::Bound if a > b => return outside("the lower bound first, then the upper"),
         Function::Bound => c.clamp(a, b),
+        // All others work on texts, axes and frames: they have been dealt with.
+        _ => return outside("another function"),
     };
     finite(result, columns)
 }

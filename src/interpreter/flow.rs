@@ -7,7 +7,7 @@ use super::evaluate::{evaluate, integers, number};
 use super::run::Interpreter;
 use super::value::Value;
 use crate::program::syntax::{Case, Definition, Expr, ForLoop, Initial, Statement, Target};
-use crate::program::{Columns, Cursor, Fault, Outcome, codes};
+use crate::program::{Columns, Cursor, Fault, Outcome, codes, is_synchronised};
 use std::cmp::Ordering;
 
 /// A part of a program that is executed several times, or apart from the rest.
@@ -85,7 +85,11 @@ impl Interpreter {
             Statement::ModalCall(call) => self.modal_call(call.as_deref()),
             Statement::CallPath(path) => self.set_call_path(path.as_ref()),
             Statement::Return(wanted) => self.return_from(wanted),
+            // MCALL of a cycle that is not made, or a synchronised action.
             Statement::NotActedOn(entry, columns) => {
+                if !is_synchronised(entry.word) {
+                    self.modal_call = None;
+                }
                 self.report_word(entry, columns);
                 Ok(())
             }
@@ -94,7 +98,7 @@ impl Interpreter {
 
     fn set_call_path(&mut self, path: Option<&Expr>) -> Outcome<()> {
         let path = match path {
-            Some(path) => Some(evaluate(path, &self.variables)?.text().to_string()),
+            Some(path) => Some(self.text_of(&evaluate(path, self)?, &path.columns)?.to_string()),
             None => None,
         };
         self.library.set_call_path(path);
@@ -102,7 +106,7 @@ impl Interpreter {
     }
 
     fn truth(&self, condition: &Expr) -> Outcome<bool> {
-        evaluate(condition, &self.variables)?.truth(&condition.columns)
+        evaluate(condition, self)?.truth(&condition.columns)
     }
 
     /// Line of the partner of the control word in this line.
@@ -127,7 +131,7 @@ impl Interpreter {
 
     fn enter_for(&mut self, for_loop: &ForLoop) -> Outcome<()> {
         let end = self.partner()?;
-        let first = evaluate(&for_loop.first, &self.variables)?;
+        let first = evaluate(&for_loop.first, self)?;
         self.assign(&for_loop.counter, &first, &for_loop.counter_columns, &for_loop.first.columns)?;
         if self.counter_is_past(for_loop)? {
             self.go_behind(end)?;
@@ -153,29 +157,39 @@ impl Interpreter {
 
     fn counter_is_past(&self, for_loop: &ForLoop) -> Outcome<bool> {
         let counter = self.read(&for_loop.counter, &for_loop.counter_columns)?;
-        let last = evaluate(&for_loop.last, &self.variables)?;
+        let last = evaluate(&for_loop.last, self)?;
         Ok(counter.compare(&last, &for_loop.last.columns)? == Ordering::Greater)
     }
 
     fn case(&mut self, case: &Case) -> Outcome<()> {
-        let selector = evaluate(&case.selector, &self.variables)?;
+        let selector = evaluate(&case.selector, self)?;
         for (value, jump) in &case.branches {
-            if evaluate(value, &self.variables)?.compare(&selector, &value.columns)? == Ordering::Equal {
+            if evaluate(value, self)?.compare(&selector, &value.columns)? == Ordering::Equal {
                 return self.jump(jump);
             }
         }
         case.default.as_ref().map_or(Ok(()), |jump| self.jump(jump))
     }
 
-    fn define(&mut self, definition: &Definition) -> Outcome<()> {
+    pub(super) fn define(&mut self, definition: &Definition) -> Outcome<()> {
+        if definition.global && self.globals_defined_here() {
+            let columns = definition.variables.first().map_or(0..0, |variable| variable.columns.clone());
+            return Err(Fault::new(
+                codes::BAD_BLOCK,
+                columns,
+                "NCK and CHAN variables are defined in definition files",
+            )
+            .label("global in a program")
+            .help("leave NCK or CHAN away, or give the file with --gud"));
+        }
         for variable in &definition.variables {
-            let dimensions = integers(&variable.dimensions, &self.variables)?;
+            let dimensions = integers(&variable.dimensions, self)?;
             let at = (self.current.line, &variable.columns);
             self.variables.define(&variable.name, definition.variable_type, &dimensions, at)?;
             match &variable.initial {
                 Initial::None => {}
                 Initial::One(value) if dimensions.is_empty() => {
-                    let result = evaluate(value, &self.variables)?;
+                    let result = evaluate(value, self)?;
                     self.variables.set(&variable.name, &[], &result, (&variable.columns, &value.columns))?;
                 }
                 initial => self.fill(&variable.name, &[], initial, &variable.columns)?,
@@ -190,15 +204,15 @@ impl Interpreter {
         match initial {
             Initial::None => {}
             Initial::One(value) => {
-                let result = evaluate(value, &self.variables)?;
+                let result = evaluate(value, self)?;
                 for place in range {
                     self.variables.set_place(name, place, &result, &value.columns)?;
                 }
             }
             Initial::Repeat(value, count) => {
-                let result = evaluate(value, &self.variables)?;
+                let result = evaluate(value, self)?;
                 let count = match count {
-                    Some(count) => number(count, &self.variables)?.max(0.0) as usize,
+                    Some(count) => number(count, self)?.max(0.0) as usize,
                     None => usize::MAX,
                 };
                 for place in range.take(count) {
@@ -216,7 +230,7 @@ impl Interpreter {
                 }
                 for (place, value) in range.zip(values) {
                     if let Some(value) = value {
-                        let result = evaluate(value, &self.variables)?;
+                        let result = evaluate(value, self)?;
                         self.variables.set_place(name, place, &result, &value.columns)?;
                     }
                 }
@@ -235,25 +249,25 @@ impl Interpreter {
     ) -> Outcome<()> {
         match target {
             Target::Parameter(index) => {
-                let number = evaluate(index, &self.variables)?.integer(&index.columns)?;
+                let number = evaluate(index, self)?.integer(&index.columns)?;
                 self.variables.set_parameter(number, value.number(value_columns)?, &index.columns)
             }
             Target::Variable { name, indices } => {
-                let indices = integers(indices, &self.variables)?;
+                let indices = integers(indices, self)?;
                 self.variables.set(name, &indices, value, (target_columns, value_columns))
             }
+            Target::System(system) => self.set_system_variable(system, value, target_columns, value_columns),
         }
     }
 
     fn read(&self, target: &Target, columns: &Columns) -> Outcome<Value> {
         match target {
             Target::Parameter(index) => {
-                let number = evaluate(index, &self.variables)?.integer(&index.columns)?;
+                let number = evaluate(index, self)?.integer(&index.columns)?;
                 self.variables.parameter(number, columns).map(Value::Real)
             }
-            Target::Variable { name, indices } => {
-                self.variables.get(name, &integers(indices, &self.variables)?, columns)
-            }
+            Target::Variable { name, indices } => self.variables.get(name, &integers(indices, self)?, columns),
+            Target::System(system) => self.system_variable(system, columns),
         }
     }
 }

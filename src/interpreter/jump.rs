@@ -33,7 +33,7 @@ impl Interpreter {
             self.next = self.source.first();
             return Ok(());
         };
-        let name = self.text_of(destination)?;
+        let name = self.destination(destination)?;
         match self.find_text(&name, jump.direction)? {
             Some(cursor) => self.jump_to(cursor),
             None if jump.direction == Direction::BothQuiet => {}
@@ -53,11 +53,11 @@ impl Interpreter {
     }
 
     /// A destination as text: a label in capitals, or `N90`.
-    pub(super) fn text_of(&self, destination: &Destination) -> Outcome<Arc<str>> {
+    fn destination(&self, destination: &Destination) -> Outcome<Arc<str>> {
         let text = match destination {
             Destination::Number(number) => return Ok(format!("N{number}").into()),
             Destination::Name(name) => self.variables.text(name).unwrap_or_else(|| name.clone()),
-            Destination::Text(text) => evaluate(text, &self.variables)?.text(),
+            Destination::Text(text) => self.text_of(&evaluate(text, self)?, &text.columns)?,
         };
         Ok(text.trim().trim_end_matches(':').to_ascii_uppercase().into())
     }
@@ -94,7 +94,7 @@ impl Interpreter {
     /// Searches a block number as the control does, and remembers the answer.
     fn find_number(&mut self, number: u64, direction: Direction) -> Outcome<Option<Cursor>> {
         let key = (self.current.line, direction, number);
-        if let Some(known) = self.memory.found_numbers.get(&key) {
+        if let Some(known) = self.known.found_numbers.get(&key) {
             return Ok(*known);
         }
         let (first, here, following) = (self.source.first(), self.current.line, self.next);
@@ -106,8 +106,8 @@ impl Interpreter {
                 found => found,
             },
         };
-        if self.memory.found_numbers.len() < FOUND_NUMBERS_MAX {
-            self.memory.found_numbers.insert(key, found);
+        if self.known.found_numbers.len() < FOUND_NUMBERS_MAX {
+            self.known.found_numbers.insert(key, found);
         }
         Ok(found)
     }
@@ -194,7 +194,7 @@ impl Interpreter {
     }
 
     fn first_of_part(&mut self, first: &Destination, columns: &Columns) -> Outcome<Cursor> {
-        let name = self.text_of(first)?;
+        let name = self.destination(first)?;
         if let Some(found) = self.find_text(&name, Direction::Backward)? {
             return Ok(found);
         }
@@ -206,7 +206,7 @@ impl Interpreter {
 
     /// Behind the block of the last label, which stands at or behind the first one.
     fn end_of_part(&mut self, last: &Destination, first: Cursor, columns: &Columns) -> Outcome<Cursor> {
-        let name = self.text_of(last)?;
+        let name = self.destination(last)?;
         let here = (self.current, self.next);
         (self.current, self.next) = (Cursor { line: first.line.saturating_sub(1), ..first }, first);
         let found = self.find_text(&name, Direction::Forward);

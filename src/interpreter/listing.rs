@@ -7,7 +7,7 @@
 //! |  |   |          |     |                     |                         events, in order of output
 //! |  |   |          |     |                     modes, where they differ from the line before
 //! |  |   |          |     arcs: plane, centre, radius (mm), swept angle (deg, positive = G3)
-//! |  |   |          F in mm/min (deg/min where only rotary axes move), or `rapid`
+//! |  |   |          F in mm/min (deg/min where only rotary axes move), `F-`: none programmed, or `rapid`
 //! |  |   all axes at the end, after all frames: mm, deg
 //! |  rapid, line, arc, dwell, function
 //! line of the program
@@ -155,7 +155,7 @@ fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<
         MoveKind::Rapid => add(&mut text, "rapid"),
         MoveKind::Line | MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
             let feed = feed_per_minute(machine, start, shown);
-            add(&mut text, &feed.map_or_else(|| "rapid".to_owned(), |feed| format!("F{}", trimmed(feed))));
+            add(&mut text, &feed.map_or_else(|| "F-".to_owned(), |feed| format!("F{}", trimmed(feed))));
         }
         MoveKind::Dwell { time_s } => add(&mut text, &format!("{}s", trimmed(*time_s))),
         MoveKind::Function { stops: true } => add(&mut text, "stops"),

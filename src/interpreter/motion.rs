@@ -96,9 +96,15 @@ impl Interpreter {
                 .label("only for circles"));
         }
         if self.modal.motion != Motion::Rapid && self.modal.feed.is_none() {
-            return Err(Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
+            let fault = Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
                 .label("expected F in this block or before it")
-                .help("write F with mm/min, or G0 for a rapid"));
+                .help("write F with mm/min, or G0 for a rapid");
+            if !self.setup.lists_only {
+                return Err(fault);
+            }
+            if self.first_report(codes::NO_FEED) {
+                self.report(*fault);
+            }
         }
         let kind = match self.modal.motion {
             Motion::Rapid => MoveKind::Rapid,

@@ -122,7 +122,7 @@ impl Interpreter {
         let IndexedValue::One(value) = values else {
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "ATOL takes one value").label("a list"));
         };
-        let typed = Typed(number(&value.value, &self.variables)?);
+        let typed = Typed(number(&value.value, self)?);
         let tolerance_lu = (typed.0 >= 0.0).then(|| match self.machine.axis(axis).kind {
             AxisKind::Linear => self.modal.length_mm(typed),
             AxisKind::Rotary => rad_from_deg(typed.0),
@@ -247,7 +247,7 @@ impl Interpreter {
 
     /// A parameter of CYCLE832: its constants have names.
     fn cycle_parameter(&self, expr: &Expr) -> Outcome<f64> {
-        evaluate(&self.with_constants(expr), &self.variables)?.number(&expr.columns)
+        evaluate(&self.with_constants(expr), self)?.number(&expr.columns)
     }
 
     /// The expression with the control's constants in the place of names that the program has not defined; its depth is bounded by

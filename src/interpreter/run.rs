@@ -8,8 +8,9 @@ use super::flow::Repeat;
 use super::modal::Modal;
 use super::path_words::CornerWords;
 use super::setup::Setup;
+use super::system_values::ChannelMemory;
 use super::variables::Variables;
-use super::wire::{Event, Feed, Move, MoveKind};
+use super::wire::{Event, Feed, MainRun, Move, MoveKind};
 use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
@@ -54,6 +55,18 @@ pub struct Interpreter {
     /// Translation that each axis had when it last moved.
     pub(super) applied_lu: crate::base::AxisVector,
     pub(super) variables: Variables,
+    /// Markers, parameters and clocks of the channel.
+    pub(super) memory: ChannelMemory,
+    /// What preparation said when the path came to rest last.
+    pub(super) main_run: MainRun,
+    /// Events of assignments in the block in execution.
+    pub(super) trace_events: Vec<Event>,
+    /// The path rests for the block in execution: it may read the main run.
+    rests_for_main_run: bool,
+    /// The definition files have been executed.
+    globals_defined: bool,
+    /// A definition file is being executed.
+    pub(super) in_definitions: bool,
     /// Moves of the block in execution.
     pub(super) queue: VecDeque<Move>,
     /// All programs of the run.
@@ -64,7 +77,8 @@ pub struct Interpreter {
     pub(super) levels: Vec<Waiting>,
     /// Repeated parts in execution, outermost first.
     pub(super) repeats: Vec<Repeat>,
-    pub(super) memory: Memory,
+    /// What is known of the program in execution.
+    pub(super) known: Memory,
     /// Memories of programs that are not in execution.
     pub(super) shelf: BTreeMap<UnitId, Memory>,
     pub(super) heads: BTreeMap<UnitId, Head>,
@@ -120,12 +134,18 @@ impl Interpreter {
             position,
             applied_lu: crate::base::AxisVector::zero(),
             variables: Variables::default(),
+            memory: ChannelMemory::default(),
+            main_run: MainRun::default(),
+            trace_events: Vec::new(),
+            rests_for_main_run: false,
+            globals_defined: false,
+            in_definitions: false,
             queue: VecDeque::new(),
             library: Library::new(source.clone(), setup.directories.clone(), setup.shipped),
             unit: UnitId(0),
             levels: Vec::new(),
             repeats: Vec::new(),
-            memory: Memory::default(),
+            known: Memory::default(),
             shelf: BTreeMap::new(),
             heads: BTreeMap::new(),
             modal_call: None,
@@ -175,6 +195,11 @@ impl Interpreter {
         }
     }
 
+    /// Tells what the main run is at; called when the path rests for a `StopPreparation`, before the next move is asked for.
+    pub fn tell_main_run(&mut self, main_run: MainRun) {
+        self.main_run = main_run;
+    }
+
     /// Warnings since the last call; each word once a run.
     pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.warnings)
@@ -192,6 +217,9 @@ impl Interpreter {
 
     /// Executes one line.
     fn step(&mut self) -> Outcome<()> {
+        if !std::mem::replace(&mut self.globals_defined, true) {
+            self.define_globals()?;
+        }
         if !self.repeats.is_empty() && self.part_ends()? {
             return if self.idle_blocks > IDLE_BLOCKS_MAX { Err(self.endless()) } else { Ok(()) };
         }
@@ -214,6 +242,13 @@ impl Interpreter {
             return Ok(());
         }
         let block = self.parsed(&bytes)?;
+        if block.reads_main_run && !std::mem::replace(&mut self.rests_for_main_run, true) {
+            // The block itself is executed when the path rests.
+            self.next = self.current;
+            self.emit(MoveKind::StopPreparation, self.standing_feed(), false, Vec::new());
+            return Ok(());
+        }
+        self.rests_for_main_run = false;
         if block.statement != Statement::Words(Vec::new()) {
             self.number += 1;
         }
@@ -228,20 +263,20 @@ impl Interpreter {
     /// Parses the line in execution; what a loop passes again is kept.
     fn parsed(&mut self, bytes: &[u8]) -> Outcome<Arc<Block>> {
         let line = self.current.line;
-        if let Some(kept) = self.memory.kept_blocks.get(&line) {
+        if let Some(kept) = self.known.kept_blocks.get(&line) {
             return Ok(kept.clone());
         }
         let block = Arc::new(parse(&self.source.decode(bytes), &self.dialect)?);
-        if line <= self.memory.furthest_line {
-            self.memory.keep(line, &block, bytes.len());
+        if line <= self.known.furthest_line {
+            self.known.keep(line, &block, bytes.len());
         }
-        self.memory.furthest_line = self.memory.furthest_line.max(line);
+        self.known.furthest_line = self.known.furthest_line.max(line);
         Ok(block)
     }
 
     /// The block at a line that was executed before.
     pub(super) fn block_at(&mut self, cursor: Cursor) -> Outcome<Arc<Block>> {
-        if let Some(kept) = self.memory.kept_blocks.get(&cursor.line) {
+        if let Some(kept) = self.known.kept_blocks.get(&cursor.line) {
             return Ok(kept.clone());
         }
         let line = self.source.line(&mut self.window, cursor)?;
@@ -250,7 +285,7 @@ impl Interpreter {
             None => ("".into(), 0),
         };
         let block = Arc::new(parse(&text, &self.dialect)?);
-        self.memory.keep(cursor.line, &block, length);
+        self.known.keep(cursor.line, &block, length);
         Ok(block)
     }
 
@@ -294,6 +329,12 @@ impl Interpreter {
     /// True the first time that this word or code is to be reported.
     pub(super) fn first_report(&mut self, word_or_code: &'static str) -> bool {
         self.warned.insert(word_or_code)
+    }
+
+    /// Puts an error on the list that does not end the program.
+    pub(super) fn report(&mut self, fault: Fault) {
+        let diagnostic = self.diagnostic(fault);
+        self.warnings.push(diagnostic);
     }
 
     /// Puts a finding on the list of warnings.

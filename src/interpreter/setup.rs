@@ -19,11 +19,21 @@ pub struct Setup {
     pub definitions: Vec<ProgramSource>,
     /// Skip levels that are active, one bit each: bit 0 is `/` and `/0`.
     pub skip_levels: u16,
+    /// Nothing will move: what only the motion lacks (F) is a finding that does not end the program, so that a listing or a check goes on
+    /// to its end.
+    pub lists_only: bool,
 }
 
 impl From<ProgramSource> for Setup {
     fn from(program: ProgramSource) -> Self {
-        Self { program, directories: Vec::new(), shipped: &[], definitions: Vec::new(), skip_levels: 0 }
+        Self {
+            program,
+            directories: Vec::new(),
+            shipped: &[],
+            definitions: Vec::new(),
+            skip_levels: 0,
+            lists_only: false,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! In: values. Out: [`Value`], conversions with a finding where there is none. REAL to INT rounds half away from zero (the
 //! control's rule for assignments: a fraction of 0.5 or more is rounded up). Comparison of REAL is relative (1e-12).
 
+use crate::base::AxisId;
 use crate::program::{Columns, Fault, Outcome, codes};
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -21,6 +22,8 @@ pub enum Value {
     Real(f64),
     /// STRING.
     Text(Arc<str>),
+    /// AXIS; `None` before the first assignment.
+    Axis(Option<AxisId>),
 }
 
 impl Value {
@@ -32,6 +35,10 @@ impl Value {
             Self::Real(value) => Ok(*value),
             Self::Text(_) => {
                 Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a text stands where a number is needed")
+                    .label("expected a number"))
+            }
+            Self::Axis(_) => {
+                Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "an axis stands where a number is needed")
                     .label("expected a number"))
             }
         }
@@ -53,13 +60,14 @@ impl Value {
         Ok(self.number(columns)? != 0.0)
     }
 
-    /// As text, for `<<` and MSG.
-    pub fn text(&self) -> Arc<str> {
+    /// As text, for `<<` and MSG; an axis has none without AXSTRING.
+    pub fn text(&self) -> Option<Arc<str>> {
         match self {
-            Self::Text(text) => text.clone(),
-            Self::Bool(value) => Arc::from(if *value { "1" } else { "0" }),
-            Self::Int(value) => value.to_string().into(),
-            Self::Real(value) => trimmed(*value).into(),
+            Self::Text(text) => Some(text.clone()),
+            Self::Bool(value) => Some(Arc::from(if *value { "1" } else { "0" })),
+            Self::Int(value) => Some(value.to_string().into()),
+            Self::Real(value) => Some(trimmed(*value).into()),
+            Self::Axis(_) => None,
         }
     }
 
@@ -68,6 +76,7 @@ impl Value {
         match (self, other) {
             (Self::Text(a), Self::Text(b)) => Ok(a.cmp(b)),
             (Self::Int(a), Self::Int(b)) => Ok(a.cmp(b)),
+            (Self::Axis(a), Self::Axis(b)) => Ok(a.cmp(b)),
             _ => {
                 let (a, b) = (self.number(columns)?, other.number(columns)?);
                 if (a - b).abs() <= EQUAL_RATIO * a.abs().max(b.abs()) {

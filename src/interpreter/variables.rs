@@ -22,6 +22,8 @@ pub struct Variables {
     declared: BTreeMap<Arc<str>, Variable>,
     /// Those of the programs that wait for its end, outermost first: out of its sight (MD11120 = 0).
     waiting: Vec<BTreeMap<Arc<str>, Variable>>,
+    /// GUD: known to all programs.
+    global: BTreeMap<Arc<str>, Variable>,
     elements: usize,
 }
 
@@ -34,7 +36,7 @@ impl Whole {
     pub fn of(variable_type: VariableType, value: Option<&Value>, line: u32, columns: &Columns) -> Outcome<Self> {
         let value = match value {
             Some(value) => convert(variable_type, value, columns)?,
-            None => zero(variable_type),
+            None => zero(variable_type, columns)?,
         };
         Ok(Self(Variable { variable_type, line, dimensions: Vec::new(), values: vec![value] }))
     }
@@ -85,13 +87,18 @@ impl Whole {
     }
 }
 
-fn zero(variable_type: VariableType) -> Value {
-    match variable_type {
+/// Value before the first assignment.
+fn zero(variable_type: VariableType, columns: &Columns) -> Outcome<Value> {
+    Ok(match variable_type {
         VariableType::Bool => Value::Bool(false),
         VariableType::Char | VariableType::Int => Value::Int(0),
         VariableType::Real => Value::Real(0.0),
         VariableType::Text(_) => Value::Text(Arc::from("")),
-    }
+        VariableType::Axis => Value::Axis(None),
+        VariableType::Frame => {
+            return Err(Fault::new(codes::NOT_BUILT, columns.clone(), "FRAME: not built yet").label("not built yet"));
+        }
+    })
 }
 
 #[derive(Clone, Debug)]
@@ -131,9 +138,27 @@ impl Variables {
         Ok(())
     }
 
+    /// True if there is a variable of that name.
+    pub fn is_declared(&self, name: &str) -> bool {
+        self.find(name).is_some()
+    }
+
+    fn find(&self, name: &str) -> Option<&Variable> {
+        self.declared.get(name).or_else(|| self.global.get(name))
+    }
+
+    fn find_mut(&mut self, name: &str) -> Option<&mut Variable> {
+        self.declared.get_mut(name).or_else(|| self.global.get_mut(name))
+    }
+
+    /// What has been defined so far becomes global: the end of a definition file.
+    pub fn make_global(&mut self) {
+        self.global.append(&mut self.declared);
+    }
+
     /// True if the name stands for a STRING without indices: a computed jump target.
     pub fn text(&self, name: &str) -> Option<Arc<str>> {
-        match self.declared.get(name)?.values.as_slice() {
+        match self.find(name)?.values.as_slice() {
             [Value::Text(text)] => Some(text.clone()),
             _ => None,
         }
@@ -179,7 +204,7 @@ impl Variables {
             .label(format!("at most {ELEMENTS_MAX}")));
         }
         self.elements = elements;
-        let zero = zero(variable_type);
+        let zero = zero(variable_type, columns)?;
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
         Ok(())
@@ -192,7 +217,7 @@ impl Variables {
 
     /// A whole variable as a sub-program left it: stored in one of the same size.
     pub fn set_whole(&mut self, name: &str, whole: Whole) {
-        if let Some(variable) = self.declared.get_mut(name)
+        if let Some(variable) = self.find_mut(name)
             && variable.values.len() == whole.0.values.len()
         {
             variable.values = whole.0.values;
@@ -213,14 +238,13 @@ impl Variables {
         Ok(())
     }
 
-    /// True if DEF has made it.
-    pub fn is_declared(&self, name: &str) -> bool {
-        self.declared.contains_key(name)
-    }
-
     /// Value of a variable or array element.
     pub fn get(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<Value> {
         let variable = self.declared(name, columns)?;
+        if let Some((at, indices)) = variable.character(indices) {
+            let place = variable.place(name, indices, columns)?;
+            return character(&variable.values[place], at, columns);
+        }
         let place = variable.place(name, indices, columns)?;
         Ok(variable.values[place].clone())
     }
@@ -229,9 +253,18 @@ impl Variables {
     pub fn set(&mut self, name: &str, indices: &[i32], value: &Value, columns: (&Columns, &Columns)) -> Outcome<()> {
         let (name_columns, value_columns) = columns;
         let variable = self.declared(name, name_columns)?;
-        let place = variable.place(name, indices, name_columns)?;
-        let converted = convert(variable.variable_type, value, value_columns)?;
-        if let Some(variable) = self.declared.get_mut(name) {
+        let (place, converted) = match variable.character(indices) {
+            Some((at, indices)) => {
+                let place = variable.place(name, indices, name_columns)?;
+                let code = convert(VariableType::Char, value, value_columns)?;
+                (place, with_character(&variable.values[place], at, &code, name_columns)?)
+            }
+            None => {
+                let place = variable.place(name, indices, name_columns)?;
+                (place, convert(variable.variable_type, value, value_columns)?)
+            }
+        };
+        if let Some(variable) = self.find_mut(name) {
             variable.values[place] = converted;
         }
         Ok(())
@@ -246,7 +279,7 @@ impl Variables {
 
     /// Sets the element at a place given by [`Self::fill_range`].
     pub fn set_place(&mut self, name: &str, place: usize, value: &Value, columns: &Columns) -> Outcome<()> {
-        if let Some(variable) = self.declared.get_mut(name)
+        if let Some(variable) = self.find_mut(name)
             && let Some(element) = variable.values.get_mut(place)
         {
             *element = convert(variable.variable_type, value, columns)?;
@@ -255,8 +288,8 @@ impl Variables {
     }
 
     fn declared(&self, name: &str, columns: &Columns) -> Outcome<&Variable> {
-        self.declared.get(name).ok_or_else(|| {
-            let near = nearest(name, self.declared.keys().map(|known| &**known));
+        self.find(name).ok_or_else(|| {
+            let near = nearest(name, self.declared.keys().chain(self.global.keys()).map(|known| &**known));
             undeclared(name, near, columns)
         })
     }
@@ -272,7 +305,42 @@ pub fn undeclared(name: &str, near: Option<&str>, columns: &Columns) -> Box<Faul
         ))
 }
 
+/// Character `at` of a text, as CHAR.
+fn character(text: &Value, at: i32, columns: &Columns) -> Outcome<Value> {
+    let Value::Text(text) = text else { return Ok(Value::Int(0)) };
+    let found = usize::try_from(at).ok().and_then(|at| text.chars().nth(at));
+    found.map(|found| Value::Int(found as i32)).ok_or_else(|| no_character(text, at, columns))
+}
+
+/// The text with another character `at`; just behind its end it grows.
+fn with_character(text: &Value, at: i32, code: &Value, columns: &Columns) -> Outcome<Value> {
+    let (Value::Text(text), Value::Int(code)) = (text, code) else { return Ok(text.clone()) };
+    let mut characters: Vec<char> = text.chars().collect();
+    let new = u32::try_from(*code).ok().and_then(char::from_u32).unwrap_or(' ');
+    match usize::try_from(at).ok().and_then(|at| characters.get_mut(at)) {
+        Some(old) => *old = new,
+        None => return Err(no_character(text, at, columns)),
+    }
+    Ok(Value::Text(characters.into_iter().collect::<String>().into()))
+}
+
+fn no_character(text: &str, at: i32, columns: &Columns) -> Box<Fault> {
+    let length = text.chars().count();
+    Fault::new(codes::BAD_INDEX, columns.clone(), format!("this text has no character {at}")).label(if length == 0 {
+        "the text is empty".to_owned()
+    } else {
+        format!("expected 0 to {}", length - 1)
+    })
+}
+
 impl Variable {
+    /// One index more than dimensions, of a STRING: the place of a character, and the indices before it.
+    fn character<'i>(&self, indices: &'i [i32]) -> Option<(i32, &'i [i32])> {
+        let (last, before) = indices.split_last()?;
+        (matches!(self.variable_type, VariableType::Text(_)) && before.len() == self.dimensions.len())
+            .then_some((*last, before))
+    }
+
     fn place(&self, name: &str, indices: &[i32], columns: &Columns) -> Outcome<usize> {
         if indices.len() != self.dimensions.len() {
             let message = format!("`{name}` has {} dimensions", self.dimensions.len());
@@ -317,6 +385,14 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
         (VariableType::Char, Value::Text(text)) if text.chars().count() == 1 => {
             Value::Int(text.chars().next().map_or(0, |c| c as i32))
         }
+        (VariableType::Axis, Value::Axis(_)) => value.clone(),
+        (VariableType::Axis, _) => {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only an axis can be stored in an AXIS")
+                .label("expected the name of an axis")
+                .help("AXNAME makes an axis of a text"));
+        }
+        // DEF refuses it.
+        (VariableType::Frame, value) => value.clone(),
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
         (VariableType::Real, value) => Value::Real(value.number(columns)?),
         (VariableType::Int, value) => Value::Int(value.integer(columns)?),

@@ -269,6 +269,15 @@ impl Modes {
     }
 }
 
+/// What the main run tells the interpreter when the path has come to rest for a `StopPreparation`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct MainRun {
+    /// Time since the program began.
+    pub time_s: f64,
+    /// Of it, time in feed motions.
+    pub cutting_time_s: f64,
+}
+
 /// What is output at the start of a block.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {

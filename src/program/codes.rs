@@ -98,6 +98,7 @@ codes! {
     BAD_INDEX "E0307" "An index outside the array";
     TEXT_TOO_LONG "E0308" "A text longer than its variable";
     TOO_MUCH_MEMORY "E0309" "Variables larger than the memory of the control";
+    UNKNOWN_SYSTEM_VARIABLE "E0310" "A system variable that is not known here";
     NO_TARGET "E0401" "A jump to a label or block number that is not there";
     UNBALANCED "E0402" "IF, FOR, WHILE, LOOP or REPEAT without its end, or the other way round";
     ENDLESS "E0403" "A loop without motion that does not end";

@@ -55,6 +55,11 @@ impl Dialect {
         }
     }
 
+    /// Name of an axis, in capitals.
+    pub fn name(&self, axis: AxisId) -> Option<&str> {
+        self.names.iter().find(|(_, id)| *id == axis).map(|(name, _)| name.as_str())
+    }
+
     /// Axis names for help texts: "X, Y, Z".
     pub fn axis_list(&self) -> String {
         self.names.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")

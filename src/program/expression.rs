@@ -5,7 +5,7 @@
 
 use super::codes::{self, Fault, Outcome};
 use super::lexer::{Lexer, Number, Token};
-use super::syntax::{Binary, Expr, ExprKind, Unary};
+use super::syntax::{Binary, Expr, ExprKind, SystemName, Unary};
 use super::words::{self, Role};
 
 /// Brackets, indices and signs inside one another.
@@ -51,7 +51,10 @@ pub fn expected(lexer: &Lexer, what: &str) -> Box<Fault> {
         Token::Name(name) => format!("expected {what}, found `{name}`"),
         Token::Symbol(symbol) => format!("expected {what}, found `{symbol}`"),
     };
-    Fault::new(codes::EXPECTED_SYMBOL, lexer.columns_of_next(), message).label(format!("expected {what}"))
+    let label_misplaced = lexer.peek() == Token::Symbol(":");
+    Fault::new(codes::EXPECTED_SYMBOL, lexer.columns_of_next(), message)
+        .label(format!("expected {what}"))
+        .maybe_help(label_misplaced.then(|| "a label stands at the start of the block: `NAME:`".to_owned()))
 }
 
 impl ExprParser<'_, '_> {
@@ -129,6 +132,8 @@ impl ExprParser<'_, '_> {
             return Ok(parameter);
         }
         let role = words::role(name);
+        let is_call = self.lexer.peek() == Token::Symbol("(");
+        let role = role.filter(|role| is_call || !words::is_free_name(*role));
         if let Some(Role::Function(function)) = role {
             return self.call(function, name, start);
         }
@@ -145,14 +150,13 @@ impl ExprParser<'_, '_> {
         if name.eq_ignore_ascii_case("FALSE") {
             return Ok(ExprKind::Bool(false));
         }
+        if name.eq_ignore_ascii_case("PI") {
+            return Ok(ExprKind::Real(std::f64::consts::PI));
+        }
         let columns = self.lexer.columns_from(start);
         if name.starts_with('$') {
-            return Err(Fault::new(
-                codes::NOT_BUILT,
-                columns,
-                format!("the system variable `{name}` cannot be read yet"),
-            )
-            .label("not built yet"));
+            let indices = self.indices()?;
+            return Ok(ExprKind::System(SystemName { name: name.to_ascii_uppercase().into(), indices }));
         }
         match role {
             None | Some(Role::FunctionNotBuilt(_)) => {
@@ -194,14 +198,14 @@ impl ExprParser<'_, '_> {
         let arguments = self.arguments(")")?;
         let columns = self.lexer.columns_from(start);
         let count = arguments.len();
+        let (fewest, most) = function.arity();
         let arguments: Option<Vec<Expr>> = arguments.into_iter().collect();
-        match arguments.filter(|given| given.len() == function.arity()) {
-            Some(arguments) => Ok(ExprKind::Call(function, arguments)),
-            None => {
-                Err(Fault::new(codes::EXPECTED_VALUE, columns, format!("{name} takes {} values", function.arity()))
-                    .label(format!("{count} given here")))
-            }
+        if let Some(arguments) = arguments.filter(|_| (fewest..=most).contains(&count)) {
+            return Ok(ExprKind::Call(function, arguments));
         }
+        let takes = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
+        Err(Fault::new(codes::EXPECTED_VALUE, columns, format!("{name} takes {takes} values"))
+            .label(format!("{count} given here")))
     }
 
     fn other_call(&mut self, name: &str, role: Option<Role>, start: usize) -> Outcome<ExprKind> {
@@ -213,10 +217,6 @@ impl ExprParser<'_, '_> {
         }
         match role {
             Some(Role::NotBuilt(reason) | Role::FunctionNotBuilt(reason)) => Err(not_built(name, reason, columns)),
-            _ if name.starts_with('$') => {
-                Err(Fault::new(codes::NOT_BUILT, columns, format!("`{name}` cannot be read yet"))
-                    .label("not built yet"))
-            }
             _ => Err(Fault::new(codes::UNKNOWN_WORD, columns, format!("there is no function `{name}`"))
                 .label("expected a function such as SIN or SQRT")
                 .maybe_help(words::did_you_mean(name))),
@@ -299,6 +299,7 @@ fn binary_operator(token: &Token) -> Option<Binary> {
     ];
     match token {
         Token::Symbol(symbol) => Some(match *symbol {
+            ":" => Binary::Chain,
             "*" => Binary::Multiply,
             "/" => Binary::Divide,
             "+" => Binary::Add,

@@ -37,7 +37,8 @@ pub enum Token<'a> {
 }
 
 /// Two-character symbols first.
-const SYMBOLS: [&str; 17] = ["==", "<>", "<=", ">=", "<<", "<", ">", "=", "+", "-", "*", "/", "(", ")", "[", "]", ","];
+const SYMBOLS: [&str; 18] =
+    ["==", "<>", "<=", ">=", "<<", "<", ">", "=", "+", "-", "*", "/", "(", ")", "[", "]", ",", ":"];
 
 impl<'a> Lexer<'a> {
     /// At the start of `text`.
@@ -185,8 +186,7 @@ impl<'a> Lexer<'a> {
             columns,
             format!("the character `{}` has no meaning here", character.escape_default()),
         )
-        .label("unexpected")
-        .maybe_help((character == ':').then(|| "a label stands at the start of the block: `NAME:`".to_owned())))
+        .label("unexpected"))
     }
 
     /// Takes an unsigned number: digits with an optional point and an exponent EX.

@@ -16,20 +16,26 @@ mod not_acted_on;
 mod not_built;
 mod parser;
 pub mod plain;
+mod print;
+mod print_calls;
 pub mod source;
 mod statements;
 pub mod structure;
 pub mod syntax;
+mod system_variables;
 pub mod text;
+mod visit;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
 pub use dialect::{Dialect, taken_axis_names};
 pub use library::{Library, Shipped, UnitId};
-pub use parser::{parse, whole_number};
+pub use parser::{is_synchronised, parse, whole_number};
+pub use print::print;
 pub use source::{Cursor, Line, ProgramSource, Window};
 pub use statements::{TEXT_MAX, block_number, visit_names};
 pub use syntax::{Block, VariableType};
+pub use system_variables::{SYSTEM_VARIABLES, SystemVariable};
 pub use text::ProgramText;
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 

@@ -28,7 +28,6 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
         "kinematic transformations are not built yet: without them the axes would not go where the program says",
     ),
     (&["DIAMON", "DIAM90"], "diameter programming is not built yet"),
-    (&["AXIS", "FRAME"], "variables of type AXIS and FRAME are not built yet"),
     (&["WRITE", "READ", "DELETE", "ISFILE"], "reading and writing files from the program is not built yet"),
     (&["SETAL"], "alarms from the program are not built yet"),
     (&["MEAS", "MEAW", "MEAC"], "measuring is not built yet"),
@@ -36,7 +35,4 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
 ];
 
 /// Functions of expressions that are not built.
-pub(super) const FUNCTIONS_NOT_BUILT: &[&str] = &[
-    "CTRANS", "CROT", "CROTS", "CSCALE", "CMIRROR", "CFINE", "MEAFRAME", "STRLEN", "SUBSTR", "TOUPPER", "TOLOWER",
-    "INDEX", "RINDEX", "MINDEX", "NUMBER", "ISNUMBER", "AXNAME", "ISAXIS", "AXSTRING", "ISVAR",
-];
+pub(super) const FUNCTIONS_NOT_BUILT: &[&str] = &["MEAFRAME", "GETMDACT", "SPI", "GETTCOR"];

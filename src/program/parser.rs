@@ -11,9 +11,10 @@ use super::expression::{arguments, expected, expression, indices, not_built, unu
 use super::lexer::{Lexer, Number, Token};
 use super::statements::{initial, statement};
 use super::syntax::{
-    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, IndexedValue, Initial, Statement, Target, Word,
-    WordKind,
+    Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, IndexedValue, Initial, Statement, SystemName,
+    Target, Word, WordKind,
 };
+use super::visit::reads_main_run;
 use super::words::{self, IndexedAddress, NotActedOn, Role};
 
 /// Values that PO may have: the end point and coefficients.
@@ -23,9 +24,17 @@ const INTEGER_MAX: f64 = 2_147_483_647.0;
 
 /// Parses a line.
 pub fn parse(text: &str, dialect: &Dialect) -> Outcome<Block> {
+    let mut block = parse_words(text, dialect)?;
+    if text.contains('$') {
+        block.reads_main_run = reads_main_run(&block.statement);
+    }
+    Ok(block)
+}
+
+fn parse_words(text: &str, dialect: &Dialect) -> Outcome<Block> {
     let mut lexer = Lexer::new(text);
     let empty = Statement::Words(Vec::new());
-    let mut block = Block { skip: None, number: None, label: None, statement: empty };
+    let mut block = Block { skip: None, number: None, label: None, statement: empty, reads_main_run: false };
     if lexer.peek_byte() == Some(b'%') {
         // Header of a transmission or archive: `%_N_NAME_MPF`.
         return Ok(block);
@@ -68,15 +77,22 @@ const ADDRESS_LETTERS: &[u8] = b"DFGHIJKLMNPRST";
 /// Words that open a synchronised action: the rest of the line belongs to it.
 const SYNCHRONISED: [&str; 7] = ["ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO"];
 
+/// True for a word that opens a synchronised action.
+pub fn is_synchronised(word: &str) -> bool {
+    SYNCHRONISED.contains(&word)
+}
+
 fn end_of_block(mut lexer: Lexer, block: Block) -> Outcome<Block> {
     if lexer.at_end() {
         return Ok(block);
     }
     let columns = lexer.columns_of_next();
-    lexer.token()?;
+    let is_equals = lexer.token()? == Token::Symbol("=");
+    let help =
+        if is_equals { "did you mean `==`? A comparison is written so" } else { "write it into a block of its own" };
     Err(Fault::new(codes::TRAILING_TEXT, columns, "the statement ends before this")
         .label("expected the end of the block")
-        .help("write it into a block of its own"))
+        .help(help))
 }
 
 /// `/` or `/0` to `/9`.
@@ -383,11 +399,8 @@ impl<'a> WordParser<'_, 'a, '_> {
                 return self.assignment(Target::Parameter(Expr { columns, kind: ExprKind::Int(number) }));
             }
         }
-        let known = if upper.starts_with("$TC_") { "$TC_" } else { upper.as_str() };
-        match words::role(known) {
-            Some(Role::NotActedOn(entry)) => self.pass_over(entry),
-            _ => Err(not_built(name, "this system variable cannot be written yet", columns)),
-        }
+        let indices = indices(self.lexer)?;
+        self.assignment(Target::System(SystemName { name: upper.into(), indices }))
     }
 
     /// A word of two letters or more.
@@ -400,7 +413,8 @@ impl<'a> WordParser<'_, 'a, '_> {
             }
             return Ok(WordKind::Address(Address::Axis(axis), self.address_value()?));
         }
-        match words::role(name) {
+        let is_call = next == Token::Symbol("(");
+        match words::role(name).filter(|role| is_call || !words::is_free_name(*role)) {
             Some(Role::Keyword(keyword)) => Ok(WordKind::Keyword(keyword)),
             Some(Role::Address(address)) => {
                 if !self.lexer.take("=") {
@@ -503,7 +517,7 @@ impl<'a> WordParser<'_, 'a, '_> {
     }
 
     fn unknown_word(&mut self, name: &str, columns: Columns) -> Box<Fault> {
-        let help = words::did_you_mean(name);
+        let help = missing_equals_sign(name).or_else(|| words::did_you_mean(name));
         let is_call = self.lexer.peek() == Token::Symbol("(");
         let otherwise = if is_call {
             "a sub-program is called in a block of its own".to_owned()
@@ -514,6 +528,14 @@ impl<'a> WordParser<'_, 'a, '_> {
             .label("not a word of the language")
             .maybe_help(help.or(Some(otherwise)))
     }
+}
+
+/// Help for `CR5`: an address of several letters with its number right behind it.
+fn missing_equals_sign(name: &str) -> Option<String> {
+    let address = name.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    let number = &name[address.len()..];
+    let is_address = !number.is_empty() && matches!(words::role(address), Some(Role::Address(_)));
+    is_address.then(|| format!("an address of several letters needs `=`: {address}={number}"))
 }
 
 /// The whole number of an address such as M or T, if the value is one and not negative.

@@ -5,7 +5,7 @@
 
 use super::calls;
 use super::codes::{self, Columns, Fault, Outcome};
-use super::expression::{arguments, expected, expression, indices, not_built};
+use super::expression::{arguments, expected, expression, indices};
 use super::lexer::{Lexer, Number, Token};
 use super::syntax::{
     Case, DefinedVariable, Definition, Destination, Direction, Expr, ExprKind, ForLoop, Initial, Jump, Statement,
@@ -174,12 +174,44 @@ fn case(lexer: &mut Lexer) -> Outcome<Case> {
 }
 
 fn definition(lexer: &mut Lexer) -> Outcome<Definition> {
+    let global = keyword(lexer, "NCK") || keyword(lexer, "CHAN");
+    attributes(lexer)?;
     let variable_type = variable_type(lexer)?;
     let mut variables = vec![defined_variable(lexer)?];
     while lexer.take(",") {
         variables.push(defined_variable(lexer)?);
     }
-    Ok(Definition { variable_type, variables })
+    // Limits of the value may also stand behind it.
+    attributes(lexer)?;
+    Ok(Definition { global, variable_type, variables })
+}
+
+/// Attributes of a definition that a simulation passes over: protection, synchronisation, physical unit, limits.
+const ATTRIBUTES: [(&str, bool); 15] = [
+    ("SYNR", false),
+    ("SYNW", false),
+    ("SYNRW", false),
+    ("APR", true),
+    ("APW", true),
+    ("APX", true),
+    ("APRP", true),
+    ("APWP", true),
+    ("APRB", true),
+    ("APWB", true),
+    ("PHU", true),
+    ("LLI", true),
+    ("ULI", true),
+    ("IPO", false),
+    ("PRLOC", false),
+];
+
+fn attributes(lexer: &mut Lexer) -> Outcome<()> {
+    while let Some((_, has_value)) = ATTRIBUTES.iter().find(|(word, _)| keyword(lexer, word)) {
+        if *has_value {
+            expression(lexer)?;
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
@@ -191,10 +223,9 @@ pub(super) fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
         "INT" => VariableType::Int,
         "REAL" => VariableType::Real,
         "STRING" => VariableType::Text(text_length(lexer)?),
-        "AXIS" | "FRAME" => {
-            return Err(not_built(&name, "variables of this type are not built yet", before.columns_of_next()));
-        }
-        _ => return Err(expected(&before, "a type: BOOL, CHAR, INT, REAL or STRING[n]")),
+        "AXIS" => VariableType::Axis,
+        "FRAME" => VariableType::Frame,
+        _ => return Err(expected(&before, "a type: BOOL, CHAR, INT, REAL, STRING[n], AXIS or FRAME")),
     })
 }
 
@@ -269,7 +300,7 @@ pub(super) fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
         .label("expected two letters or underscores at its start")
         .maybe_help(name.starts_with(['R', 'r']).then(|| "R parameters need no DEF".to_owned())));
     }
-    if name.len() == 1 || !matches!(words::role(name), None | Some(Role::FunctionNotBuilt(_))) {
+    if name.len() == 1 || words::role(name).is_some_and(|role| !words::is_free_name(role)) {
         return Err(Fault::new(codes::REDECLARED, columns.clone(), format!("`{name}` is a word of the language"))
             .label("expected a name of its own"));
     }
@@ -290,6 +321,7 @@ pub fn visit_names(expression: &Expr, visit: &mut impl FnMut(&Arc<str>, &Columns
             visit_names(&operands.1, visit);
         }
         ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| visit_names(argument, visit)),
+        ExprKind::System(system) => system.indices.iter().for_each(|index| visit_names(index, visit)),
         ExprKind::Bool(_) | ExprKind::Int(_) | ExprKind::Real(_) | ExprKind::Text(_) => {}
     }
 }

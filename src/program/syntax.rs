@@ -19,6 +19,8 @@ pub struct Block {
     pub label: Option<Arc<str>>,
     /// What it does.
     pub statement: Statement,
+    /// It reads what only the main run knows: the look-ahead is emptied before it.
+    pub reads_main_run: bool,
 }
 
 /// Number of a block.
@@ -235,6 +237,8 @@ pub enum Destination {
 /// DEF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Definition {
+    /// NCK or CHAN: known to all programs. Only in definition files.
+    pub global: bool,
     /// Type of all its variables.
     pub variable_type: VariableType,
     /// The variables.
@@ -280,6 +284,10 @@ pub enum VariableType {
     Real,
     /// Text of at most so many characters.
     Text(u16),
+    /// Name of an axis.
+    Axis,
+    /// A frame.
+    Frame,
 }
 
 impl VariableType {
@@ -291,6 +299,8 @@ impl VariableType {
             Self::Int => "INT",
             Self::Real => "REAL",
             Self::Text(_) => "STRING",
+            Self::Axis => "AXIS",
+            Self::Frame => "FRAME",
         }
     }
 }
@@ -455,9 +465,20 @@ pub enum Target {
     Variable {
         /// Name in capitals.
         name: Arc<str>,
-        /// Indices.
+        /// Indices; of a FRAME or a STRING also the component or the place.
         indices: Vec<Expr>,
     },
+    /// System variable.
+    System(SystemName),
+}
+
+/// A system variable with its indices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SystemName {
+    /// Name in capitals, with its `$`.
+    pub name: Arc<str>,
+    /// Numbers, axes, components of frames.
+    pub indices: Vec<Expr>,
 }
 
 /// A number as it stands in the program, in the unit that its address and G70/G700 give it: mm, inch, degrees, mm/min and so on.
@@ -494,6 +515,8 @@ pub enum ExprKind {
         /// Indices.
         indices: Vec<Expr>,
     },
+    /// $P_EP[X] and so on.
+    System(SystemName),
     /// -a, +a, NOT a, B_NOT a.
     Unary(Unary, Box<Expr>),
     /// a + b and so on.
@@ -518,6 +541,8 @@ pub enum Unary {
 /// Operators with two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Binary {
+    /// `:` between frames
+    Chain,
     /// *
     Multiply,
     /// /
@@ -562,6 +587,7 @@ impl Binary {
     /// How tightly it binds: the control's order (programming manual 12/2019, p. 444). AND binds tighter than ==.
     pub fn priority(self) -> u8 {
         match self {
+            Self::Chain => 11,
             Self::Multiply | Self::Divide | Self::IntegerDivide | Self::Modulo => 10,
             Self::Add | Self::Subtract => 9,
             Self::BitAnd => 8,

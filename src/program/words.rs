@@ -363,15 +363,61 @@ pub enum Function {
     MinVal,
     MaxVal,
     Bound,
+    ToUpper,
+    ToLower,
+    StrLen,
+    Index,
+    Rindex,
+    Mindex,
+    Substr,
+    Number,
+    IsNumber,
+    AxName,
+    AxString,
+    IsAxis,
+    IsVar,
+    Sprint,
+    Ctrans,
+    Cfine,
+    Crot,
+    Crots,
+    Cscale,
+    Cmirror,
 }
 
 impl Function {
-    /// Number of arguments.
-    pub fn arity(self) -> usize {
+    /// Functions whose names programs also use for variables: they are functions only before a bracket.
+    pub fn leaves_its_name(self) -> bool {
+        use Function::*;
+        matches!(
+            self,
+            ToUpper
+                | ToLower
+                | StrLen
+                | Index
+                | Rindex
+                | Mindex
+                | Substr
+                | Number
+                | IsNumber
+                | AxName
+                | AxString
+                | IsAxis
+                | IsVar
+                | Sprint
+        )
+    }
+
+    /// Fewest and most arguments.
+    pub fn arity(self) -> (usize, usize) {
         match self {
-            Self::Atan2 | Self::MinVal | Self::MaxVal => 2,
-            Self::Bound => 3,
-            _ => 1,
+            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex => (2, 2),
+            Self::Substr => (2, 3),
+            Self::Bound => (3, 3),
+            Self::Sprint => (1, 11),
+            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (2, 16),
+            Self::Cmirror => (1, 8),
+            _ => (1, 1),
         }
     }
 }
@@ -536,6 +582,20 @@ pub fn role(word: &str) -> Option<Role> {
     let table = table();
     let compare = |known: &str| known.bytes().cmp(word.bytes().map(|byte| byte.to_ascii_uppercase()));
     table.binary_search_by(|(known, _)| compare(known)).ok().map(|found| table[found].1)
+}
+
+/// A word with that role: the first in alphabetical order.
+pub fn spelling(wanted: Role) -> Option<&'static str> {
+    table().iter().find(|(_, role)| *role == wanted).map(|(word, _)| *word)
+}
+
+/// True for a function that is one only before a bracket.
+pub fn is_free_name(role: Role) -> bool {
+    match role {
+        Role::Function(function) => function.leaves_its_name(),
+        Role::FunctionNotBuilt(_) => true,
+        _ => false,
+    }
 }
 
 /// Every word of the table, in alphabetical order: for help texts.
@@ -718,12 +778,33 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("MINVAL", Role::Function(Function::MinVal)),
     ("MAXVAL", Role::Function(Function::MaxVal)),
     ("BOUND", Role::Function(Function::Bound)),
+    ("TOUPPER", Role::Function(Function::ToUpper)),
+    ("TOLOWER", Role::Function(Function::ToLower)),
+    ("STRLEN", Role::Function(Function::StrLen)),
+    ("INDEX", Role::Function(Function::Index)),
+    ("RINDEX", Role::Function(Function::Rindex)),
+    ("MINDEX", Role::Function(Function::Mindex)),
+    ("SUBSTR", Role::Function(Function::Substr)),
+    ("NUMBER", Role::Function(Function::Number)),
+    ("ISNUMBER", Role::Function(Function::IsNumber)),
+    ("AXNAME", Role::Function(Function::AxName)),
+    ("AXSTRING", Role::Function(Function::AxString)),
+    ("ISAXIS", Role::Function(Function::IsAxis)),
+    ("ISVAR", Role::Function(Function::IsVar)),
+    ("SPRINT", Role::Function(Function::Sprint)),
+    ("CTRANS", Role::Function(Function::Ctrans)),
+    ("CFINE", Role::Function(Function::Cfine)),
+    ("CROT", Role::Function(Function::Crot)),
+    ("CROTS", Role::Function(Function::Crots)),
+    ("CSCALE", Role::Function(Function::Cscale)),
+    ("CMIRROR", Role::Function(Function::Cmirror)),
 ];
 
 /// Words of expressions, definitions and address values.
 const SYNTAX: &[&str] = &[
-    "AC", "ACN", "ACP", "AND", "BOOL", "B_AND", "B_NOT", "B_OR", "B_XOR", "CHAR", "DC", "DEFAULT", "DIV", "FALSE",
-    "IC", "INT", "MOD", "NOT", "OF", "OR", "QU", "REAL", "REP", "SET", "STRING", "TO", "TRUE", "XOR",
+    "AC", "ACN", "ACP", "AND", "AXIS", "BOOL", "B_AND", "B_NOT", "B_OR", "B_XOR", "CHAR", "DC", "DEFAULT", "DIV",
+    "FALSE", "FRAME", "IC", "INT", "MOD", "NOT", "OF", "OR", "PI", "QU", "REAL", "REP", "SET", "STRING", "TO", "TRUE",
+    "XOR",
 ];
 
 /// Words whose effect is already the state of this kernel, or that only matter together with words that are not built:

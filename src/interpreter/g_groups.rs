@@ -1,0 +1,101 @@
+//! $P_GG: the number of the active G function in its group (programming manual, list of G functions).
+//!
+//! In: modal state. Out: a number from 1. Groups whose functions this kernel does not tell apart answer with their first member.
+
+use super::modal::Motion;
+use super::run::Interpreter;
+use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
+use crate::program::words::{Compressor, ExactStop, Measure, Plane};
+use crate::program::{Columns, Fault, Outcome, codes};
+
+/// Number of G groups.
+const GROUPS: i32 = 64;
+
+impl Interpreter {
+    /// The active member of a group.
+    pub(super) fn active_g_function(&self, group: i32, columns: &Columns) -> Outcome<i32> {
+        let modal = &self.modal;
+        Ok(match group {
+            1 => match modal.motion {
+                Motion::Rapid => 1,
+                Motion::Line => 2,
+                Motion::Clockwise => 3,
+                Motion::CounterClockwise => 4,
+            },
+            6 => match modal.plane {
+                Plane::G17 => 1,
+                Plane::G18 => 2,
+                Plane::G19 => 3,
+            },
+            8 => i32::from(self.zero_offset_number()) + 1,
+            10 => match modal.path_mode {
+                PathMode::ExactStop => 1,
+                PathMode::G64 => 2,
+                PathMode::G641 => 3,
+                PathMode::G642 => 4,
+                PathMode::G643 => 5,
+                PathMode::G644 => 6,
+                PathMode::G645 => 7,
+            },
+            12 => match modal.exact_stop {
+                ExactStop::Fine => 1,
+                ExactStop::Coarse => 2,
+                ExactStop::Setpoint => 3,
+            },
+            13 => match modal.measure {
+                Measure::InchGeometry => 1,
+                Measure::Metric => 2,
+                Measure::Inch => 3,
+            },
+            14 => {
+                if modal.absolute {
+                    1
+                } else {
+                    2
+                }
+            }
+            15 => self.feed_type_number(),
+            21 => match modal.acceleration_mode {
+                AccelerationMode::Brisk => 1,
+                AccelerationMode::Soft => 2,
+                AccelerationMode::Drive => 3,
+            },
+            24 => {
+                if modal.feedforward_active {
+                    2
+                } else {
+                    1
+                }
+            }
+            30 => match modal.compressor {
+                Compressor::Off => 1,
+                Compressor::On => 2,
+                Compressor::Curvature => 3,
+                Compressor::Cad => 4,
+                Compressor::Surface => 5,
+            },
+            59 => match modal.dynamics {
+                DynamicsMode::Norm => 1,
+                DynamicsMode::Position => 2,
+                DynamicsMode::Rough => 3,
+                DynamicsMode::SemiFinish => 4,
+                DynamicsMode::Finish => 5,
+            },
+            1..=GROUPS => 1,
+            _ => {
+                return Err(Fault::new(codes::BAD_INDEX, columns.clone(), format!("there is no G group {group}"))
+                    .label(format!("expected 1 to {GROUPS}")));
+            }
+        })
+    }
+
+    /// Member of group 15.
+    fn feed_type_number(&self) -> i32 {
+        2
+    }
+
+    /// 0 for G500, 1 for G54 and so on.
+    fn zero_offset_number(&self) -> u16 {
+        0
+    }
+}
