@@ -16,6 +16,7 @@ use crate::machine::Machine;
 use crate::program::plain::plain_block;
 use crate::program::structure::skip_level_of;
 use crate::program::syntax::{Direction, Statement};
+use crate::program::visit::priority_trap;
 use crate::program::{
     Block, BlockRef, Columns, Cursor, Dialect, Fault, Library, NotActedOn, Outcome, ProgramId, ProgramSource, UnitId,
     Window, codes, parse,
@@ -267,6 +268,9 @@ impl Interpreter {
             return Ok(kept.clone());
         }
         let block = Arc::new(parse(&self.source.decode(bytes), &self.dialect)?);
+        if let Some(columns) = priority_trap(&block.statement) {
+            self.warn_of_priority(columns);
+        }
         if line <= self.known.furthest_line {
             self.known.keep(line, &block, bytes.len());
         }
@@ -287,6 +291,13 @@ impl Interpreter {
         let block = Arc::new(parse(&text, &self.dialect)?);
         self.known.keep(cursor.line, &block, length);
         Ok(block)
+    }
+
+    /// Once a run; `check` finds all of them.
+    fn warn_of_priority(&mut self, columns: Columns) {
+        if self.first_report(codes::PRIORITY_TRAP) {
+            self.warn(*priority_fault(columns));
+        }
     }
 
     /// The end of the run.
@@ -367,4 +378,11 @@ impl Memory {
             self.kept_blocks.insert(line, block.clone());
         }
     }
+}
+
+/// The finding for a condition that is read otherwise than it looks.
+pub(super) fn priority_fault(columns: Columns) -> Box<Fault> {
+    Fault::new(codes::PRIORITY_TRAP, columns, "AND, OR and XOR bind tighter than a comparison")
+        .label("read as one comparison of a combined value")
+        .help("write brackets around each comparison: (A == 1) AND (B == 2)")
 }

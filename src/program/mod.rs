@@ -24,7 +24,7 @@ pub mod structure;
 pub mod syntax;
 mod system_variables;
 pub mod text;
-mod visit;
+pub mod visit;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
