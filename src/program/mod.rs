@@ -5,6 +5,7 @@
 //! and control words stay syntax here.
 
 pub mod archive;
+mod call_syntax;
 mod calls;
 mod characters;
 pub mod codes;
