@@ -372,7 +372,7 @@ fn moves_without_displacement_make_no_junction() {
 #[test]
 fn corners_of_arcs_and_rotary_axes_pass_and_are_said_once() {
     let text: &[u8] = b"G1 X10\r\nG2 X20 I5\r\nG1 X30 C10\r\nG1 Y10\n";
-    let opened = OpenedProgram { id: ProgramId(0), name: Arc::from("a.mpf"), bytes: Arc::from(text) };
+    let opened = OpenedProgram { id: ProgramId(0), name: Arc::from("a.mpf"), bytes: text.into() };
     let mut moves = polyline(&[
         vec![10.0],
         vec![20.0],

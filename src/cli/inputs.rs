@@ -78,6 +78,7 @@ impl Surroundings {
         let open = |path: &PathBuf| ProgramSource::from_file(path).map_err(Failure::unreadable);
         let mut setup = Setup {
             directories: self.include.clone(),
+            shipped: SHIPPED_PROGRAMS,
             definitions: self.definitions.iter().map(open).collect::<Result<_, _>>()?,
             skip_levels: self.skip.iter().fold(0, |levels, level| levels | 1 << level),
             ..Setup::from(open_program(program)?)

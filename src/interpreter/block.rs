@@ -85,7 +85,7 @@ impl Interpreter {
             self.emit_function(block.last, true);
         }
         if block.ends {
-            self.end();
+            self.end()?;
         }
         Ok(())
     }
@@ -260,7 +260,6 @@ impl Interpreter {
             Keyword::SuppressFrames => block.motion.suppress(Suppression::All),
             Keyword::Frame(word) => return self.frame_word(word, columns, block),
             Keyword::StopPreparation => block.stops = true,
-            Keyword::Return => block.ends = true,
         }
         Ok(())
     }

@@ -29,7 +29,6 @@ pub static NOT_ACTED_ON: &[NotActedOn] = &[
         "CYCLE800",
         "the tool or table is not swivelled; programs that call it with angles need the swivelled positions",
     ),
-    entry("MCALL", "no cycle is repeated at the positions that follow: the axes only go there"),
     entry("CYCLE81", "the drilling motion of the cycle is not made"),
     entry("CYCLE82", "the drilling motion of the cycle is not made"),
     entry("CYCLE83", "the drilling motion of the cycle is not made"),

@@ -75,8 +75,6 @@ pub enum Keyword {
     Compressor(Compressor),
     /// STOPRE.
     StopPreparation,
-    /// RET.
-    Return,
 }
 
 /// Words of the programmable frame.
@@ -298,8 +296,26 @@ pub enum Procedure {
 pub enum Control {
     /// DEF.
     Define,
-    /// PROC, EXTERN: declarations, without effect until sub-programs are built.
-    Declaration,
+    /// PROC.
+    Procedure,
+    /// EXTERN.
+    External,
+    /// RET.
+    Return,
+    /// CALL.
+    Call,
+    /// PCALL.
+    PathCall,
+    /// MCALL.
+    ModalCall,
+    /// EXTCALL.
+    FileCall,
+    /// ISOCALL: refused.
+    IsoCall,
+    /// CALLPATH.
+    CallPath,
+    /// REPEATB.
+    RepeatBlock,
     /// IF.
     If,
     /// ELSE.
@@ -693,7 +709,6 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("POSP", Role::Procedure(Procedure::PositionInParts)),
     ("CYCLE832", Role::Procedure(Procedure::HighSpeedSettings)),
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
-    ("RET", Role::Keyword(Keyword::Return)),
     ("CR", Role::Address(Address::Radius)),
     ("TURN", Role::Address(Address::Turn)),
     ("ADIS", Role::Address(Address::RoundingDistance)),
@@ -722,8 +737,16 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("OVRRAP", Role::Address(Address::RapidOverride)),
     ("MSG", Role::Message),
     ("DEF", Role::Control(Control::Define)),
-    ("PROC", Role::Control(Control::Declaration)),
-    ("EXTERN", Role::Control(Control::Declaration)),
+    ("PROC", Role::Control(Control::Procedure)),
+    ("EXTERN", Role::Control(Control::External)),
+    ("RET", Role::Control(Control::Return)),
+    ("CALL", Role::Control(Control::Call)),
+    ("PCALL", Role::Control(Control::PathCall)),
+    ("MCALL", Role::Control(Control::ModalCall)),
+    ("EXTCALL", Role::Control(Control::FileCall)),
+    ("ISOCALL", Role::Control(Control::IsoCall)),
+    ("CALLPATH", Role::Control(Control::CallPath)),
+    ("REPEATB", Role::Control(Control::RepeatBlock)),
     ("IF", Role::Control(Control::If)),
     ("ELSE", Role::Control(Control::Else)),
     ("ENDIF", Role::Control(Control::EndIf)),
