@@ -15,6 +15,7 @@
 //! * Skip levels (`/`) are not active: these blocks are executed.
 //! * G601 is what is done; G602 and G603 are reported. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
+mod alarm;
 mod arc;
 mod block;
 mod check;
@@ -33,6 +34,7 @@ mod path_words;
 mod run;
 mod setup;
 mod strings;
+mod system_constants;
 mod system_values;
 mod tool_variables;
 mod value;

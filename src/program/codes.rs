@@ -109,8 +109,10 @@ codes! {
     ARC_PLANE "E0506" "A plane whose axes the machine does not have";
     DWELL "E0507" "A G4 without a time, or with revolutions of a spindle that stands";
     MODULO "E0508" "DC, ACP or ACN for an axis that is not endless";
+    RAISED "E0601" "An alarm that the program itself raises (SETAL)";
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";
     CHECK_STOPPED "W0003" "The check did not run the program to its end";
     NO_TOOL_DATA "W0004" "A tool or tool edge without data: its length and radius count as 0";
+    RAISED_AND_SHOWN "W0007" "An alarm of the program that does not stop it (SETAL)";
 }

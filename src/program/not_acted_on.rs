@@ -130,6 +130,6 @@ pub static NOT_ACTED_ON: &[NotActedOn] = &[
     entry("FROM", "the synchronised action is not executed"),
     entry("DO", "the synchronised action is not executed"),
     entry("CANCEL", "the synchronised action is not executed"),
-    entry("$AN_SLTRACE", "the recording is not marked"),
+    entry("$A_", "there is no PLC: inputs and PLC data are what the program wrote, else 0"),
     entry("$TC_", "tool data are not kept: positions are those of the tool tip with length 0"),
 ];
