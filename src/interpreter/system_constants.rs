@@ -6,8 +6,8 @@
 use super::run::Interpreter;
 use super::value::Value;
 use crate::base::units::{S_PER_MIN, deg_from_rad};
-use crate::program::syntax::SystemName;
-use crate::program::{Columns, Fault, Outcome, codes};
+use crate::program::syntax::{ExprKind, SystemName};
+use crate::program::{Block, Columns, Fault, NotActedOn, Outcome, codes, visit_expressions};
 
 /// R parameters of the channel (MD28050).
 const R_COUNT: i32 = super::variables::R_MAX + 1;
@@ -83,6 +83,30 @@ impl Interpreter {
         }))
     }
 
+    /// Reports once that there is no PLC, if a variable is one of it.
+    pub(super) fn report_plc(&mut self, name: &str, columns: &Columns) {
+        if is_plc(name)
+            && let Some(entry) = NotActedOn::find("$A_")
+        {
+            self.report_word(entry, columns);
+        }
+    }
+
+    /// The same for what a block reads.
+    pub(super) fn report_plc_reads(&mut self, block: &Block) {
+        let mut found = None;
+        visit_expressions(&block.statement, &mut |expression| {
+            if let ExprKind::System(system) = &expression.kind
+                && is_plc(&system.name)
+            {
+                found.get_or_insert((system.name.clone(), expression.columns.clone()));
+            }
+        });
+        if let Some((name, columns)) = found {
+            self.report_plc(&name, &columns);
+        }
+    }
+
     /// Keeps what a program writes; `None`: not one of these.
     pub(super) fn keep_variable(
         &mut self,
@@ -124,6 +148,11 @@ impl Interpreter {
             _ => return Ok(None),
         }))
     }
+}
+
+/// True for what a PLC would set or see.
+fn is_plc(name: &str) -> bool {
+    name.starts_with("$A_IN") || name.starts_with("$A_OUT") || name.starts_with("$A_DB")
 }
 
 fn find_kept(name: &str) -> Option<(&'static str, Kept)> {

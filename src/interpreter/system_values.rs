@@ -130,6 +130,7 @@ impl Interpreter {
             }
             Some(_) => {}
         }
+        self.report_plc(name, name_columns);
         if &**name == "$AN_SLTRACE" {
             return self.set_trace(value, value_columns);
         }
