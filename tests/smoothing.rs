@@ -72,6 +72,7 @@ fn kinds(pieces: &[ContourPiece]) -> String {
     pieces
         .iter()
         .map(|piece| match (&piece.kind, piece.stop_at_end) {
+            (PieceKind::WaitPositioned { .. }, _) => "p",
             (PieceKind::Block(_), false) => "l",
             (PieceKind::Block(_), true) => "l|",
             (PieceKind::Blend(..), false) => "b",

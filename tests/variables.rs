@@ -104,6 +104,29 @@ fn variables_of_axes() {
 }
 
 #[test]
+fn an_axis_word_may_be_computed() {
+    let text = "DEF AXIS WHICH=Y\nG0 AX[WHICH]=7 AX[X]=IC(2)\nMSG(\"\"<<$P_EP[X]<<$P_EP[Y])\n";
+    assert_eq!(messages(text), ["27"]);
+    assert_eq!(alarm("G0 AX[5]=1\n"), "E0204");
+    assert_eq!(alarm("G0 X1 AX[X]=1\n"), "E0205");
+}
+
+#[test]
+fn the_priority_of_and_is_warned_of() {
+    let warned = |text: &str| {
+        let mut interpreter = Interpreter::new(ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
+        while interpreter.next_move().expect("no alarm").is_some() {}
+        interpreter.take_warnings().iter().filter(|finding| finding.code == "W0005").count()
+    };
+    assert_eq!(warned("R1=10 R2=20\nIF R1==10 AND R2==20 GOTOF LAB\nLAB: M30\n"), 1);
+    assert_eq!(warned("R1=10 R2=20\nIF (R1==10) AND (R2==20) GOTOF LAB\nLAB: M30\n"), 0);
+    assert_eq!(warned("IF R1==(1 AND 0) GOTOF LAB\nLAB: M30\n"), 0);
+    assert_eq!(warned("IF R1+R2*2>3 GOTOF LAB\nLAB: M30\n"), 0);
+    // 10 AND 20 is TRUE, which is 1; R1 == 1 is FALSE; FALSE == 20 is FALSE.
+    assert_eq!(messages("R1=10 R2=20\nIF R1==10 AND R2==20\nMSG(\"yes\")\nELSE\nMSG(\"no\")\nENDIF\n"), ["no"]);
+}
+
+#[test]
 fn global_variables_come_from_definition_files() {
     let source = |name: &str, text: &str| ProgramSource::from_bytes(name, text.as_bytes());
     let file = "%_N_UGUD_DEF\n;$PATH=/_N_DEF_DIR\nDEF NCK SYNR APW 3 REAL DEPTH=-12.5 LLI -20 ULI 0\nDEF CHAN INT COUNT[3]=SET(1,2,3)\nM17\n";

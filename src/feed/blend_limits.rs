@@ -13,7 +13,7 @@
 //! rule, and none is added here.
 
 use super::LimitKind;
-use super::limits::{AxisRules, Demand, PieceLimits};
+use super::limits::{AxisRules, Demand, FeedCap, PieceLimits};
 use super::profile::SpeedCap;
 use crate::base::{AxisId, AxisVector};
 use crate::geometry::{BlendPoint, HermiteBlend};
@@ -52,11 +52,10 @@ enum Watch {
 const WATCHED: [Watch; 4] = [Watch::Radial, Watch::Normal, Watch::Tangential, Watch::Coupled];
 
 /// Limits of a blend.
-pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: FeedCap, jerk_limited: bool) -> PieceLimits {
     let scan = Scan::new(rules, blend);
     let samples = scan.sample();
     let (ra, rj) = (rules.radial_acceleration_share, rules.radial_jerk_share);
-    let velocity = rules.largest(|axis, limits| scan.tangent(axis) / limits.velocity_max_lu_s);
     let acceleration = rules.largest(|axis, limits| scan.tangent(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
     let jerk = rules.largest(|axis, limits| scan.tangent(axis) / ((1.0 - rj) * limits.transition_jerk_max_lu_s3));
     let coupled = greatest(&samples, Watch::Coupled);
@@ -66,7 +65,7 @@ pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: SpeedCap, je
         // "published" has the same entry; its step law is refused with the machine file.
         BlendLaw::Entry | BlendLaw::Published => scan.entry_feed(),
     };
-    let driven = feed.min(velocity.cap(LimitKind::Velocity, 1));
+    let driven = rules.driven(feed, |axis| scan.tangent(axis));
     let cap = driven.min(geometric);
     let ramp_cap = cap.min(SpeedCap { velocity_lu_s: RAMP_SPEED_RATIO * safe.velocity_lu_s, limit: safe.limit });
     let v = ramp_cap.velocity_lu_s;

@@ -12,6 +12,7 @@ use super::profile::SpeedCap;
 use super::{Limit, LimitKind};
 use crate::base::AxisVector;
 use crate::machine::CurvatureJump;
+use std::sync::Arc;
 
 /// Directions that differ by less are one direction: suits points rounded to 0.01 mm (models/arcs.md section 2).
 const TANGENT_RAD: f64 = 1e-3;
@@ -23,8 +24,13 @@ pub(super) const STOP: SpeedCap = SpeedCap { velocity_lu_s: 0.0, limit: Limit { 
 pub(super) const FREE: SpeedCap =
     SpeedCap { velocity_lu_s: f64::INFINITY, limit: Limit { kind: LimitKind::Feed, axis: None } };
 
-/// Highest speed from `before` to `after`.
-pub(super) fn cap(rules: &AxisRules, before: &Ends, after: &Ends) -> SpeedCap {
+/// Highest speed from `before` to `after`: where their modes differ, both have to allow it.
+pub(super) fn cap(rules: [&Arc<AxisRules>; 2], before: &Ends, after: &Ends) -> SpeedCap {
+    let cap = cap_under(rules[0], before, after);
+    if Arc::ptr_eq(rules[0], rules[1]) { cap } else { cap.min(cap_under(rules[1], before, after)) }
+}
+
+fn cap_under(rules: &AxisRules, before: &Ends, after: &Ends) -> SpeedCap {
     if before.rotary_only != after.rotary_only {
         // Speed changes its unit: mm/s on one side, rad/s on the other.
         return STOP;

@@ -6,12 +6,13 @@
 //! Does not look at neighbours: what a junction allows is [`junction`](super::junction)'s.
 
 use super::blend_limits;
-use super::profile::{Bounds, SpeedCap};
+use super::group::FeedGroup;
+use super::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use super::ramp::Dynamics;
 use super::{Limit, LimitKind};
 use crate::base::AxisId;
 use crate::geometry::{Arc, Curve, CurveState};
-use crate::interpreter::Feed;
+use crate::interpreter::{Feed, Modes, ProgrammedLimits};
 use crate::kinematics::JointState;
 use crate::machine::{AccelerationMode, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine};
 use crate::smoothing::ContourPiece;
@@ -20,11 +21,13 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// The jerk that is left on an arc is split in these many parts between its two uses.
 const JERK_SHARES: u32 = 16;
 
-/// Everything of the machine that speed depends on.
+/// Everything of the machine that speed depends on, under the modes of a block.
 #[derive(Clone, Debug)]
 pub(super) struct AxisRules {
-    /// Limits of every axis, in order.
+    /// Limits of every axis, in order: those of the dynamics set, with ACC, VELOLIM and JERKLIM.
     pub axes: Vec<AxisLimits>,
+    /// Highest velocity of every axis in a feed motion: FL holds as well.
+    pub feed_velocities_max_lu_s: Vec<f64>,
     /// Step of velocity that each axis may make at a corner.
     pub corner_steps_lu_s: Vec<f64>,
     /// R_A.
@@ -37,6 +40,34 @@ pub(super) struct AxisRules {
     pub curvature_jump: CurvatureJump,
     /// t_s.
     pub setpoint_period_s: f64,
+    /// SOFT.
+    pub jerk_limited: bool,
+    /// OVR and OVRRAP.
+    pub override_ratio: f64,
+    /// OVRRAP; at most 1, because the axes cannot do more.
+    pub rapid_override_ratio: f64,
+    /// FGROUP.
+    pub group: Option<FeedGroup>,
+    /// DRIVE: the two ways to keep the acceleration low at high speed.
+    pub drive: Option<Box<DriveRules>>,
+}
+
+/// DRIVE on an axis that has less acceleration at high speed (MD35220, MD35230): either the speed stays below the one from which that
+/// is so, or the acceleration is the lower one from end to end. A piece takes the quicker of the two. The control lowers it only
+/// while the speed is high: it is a little quicker.
+#[derive(Clone, Debug)]
+pub(super) struct DriveRules {
+    slow: AxisRules,
+    weak: AxisRules,
+}
+
+/// Programmed feed of a piece.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum FeedCap {
+    /// As fast as the axes can.
+    Rapid,
+    /// At most this, along s.
+    Programmed(SpeedCap),
 }
 
 /// Largest of a demand per axis, in shares of what the axis allows, and the axis.
@@ -73,26 +104,70 @@ pub(super) struct Ends {
 }
 
 impl AxisRules {
-    pub(super) fn new(machine: &Machine) -> Self {
+    /// The limits that hold under `modes`.
+    pub(super) fn new(machine: &Machine, modes: &Modes) -> Self {
+        let none = ProgrammedLimits::default();
+        let programmed = modes.programmed.as_deref().unwrap_or(&none);
+        let axes: Vec<AxisLimits> = machine.axis_ids().map(|id| axis_limits(machine, id, modes)).collect();
+        let mut rules = Self::with_axes(machine, programmed, axes);
+        rules.jerk_limited = modes.acceleration_mode == AccelerationMode::Soft;
+        rules.drive =
+            (modes.acceleration_mode == AccelerationMode::Drive).then(|| rules.drive_rules(machine)).flatten();
+        rules
+    }
+
+    fn with_axes(machine: &Machine, programmed: &ProgrammedLimits, axes: Vec<AxisLimits>) -> Self {
         let setpoint_period_s = machine.cycle.time_base.setpoint_period_s();
         let FeedSettings { corner_rule, overload_ratio, curvature_jump, .. } = machine.feed;
-        let corner_step = |axis: &crate::machine::Axis| {
-            let a = axis.limits.acceleration_max_lu_s2;
+        let corner_step = |(axis, limits): (&crate::machine::Axis, &AxisLimits)| {
+            let a = limits.acceleration_max_lu_s2;
             match corner_rule {
                 // models/feed-prediction-and-surface.md section 2 [Lavernhe 2008].
                 CornerRule::FollowUp => (8.0 * a * axis.follow_up_tolerance_lu).sqrt(),
                 CornerRule::Overload => overload_ratio * a * setpoint_period_s,
             }
         };
+        let group = programmed.feed_group.map(|members| FeedGroup::new(machine, members, programmed));
+        let linear = machine.linear_mask();
+        let feed_velocity = |(id, limits): (AxisId, &AxisLimits)| {
+            let synchronous = group.as_ref().map_or(!linear[id], |group| !group.contains(id));
+            let limit_lu_s = programmed.synchronous_max_lu_s[id].filter(|_| synchronous).unwrap_or(f64::INFINITY);
+            limits.velocity_max_lu_s.min(limit_lu_s)
+        };
         Self {
-            axes: machine.axes.iter().map(|axis| axis.limits).collect(),
-            corner_steps_lu_s: machine.axes.iter().map(corner_step).collect(),
+            feed_velocities_max_lu_s: machine.axis_ids().zip(&axes).map(feed_velocity).collect(),
+            corner_steps_lu_s: machine.axes.iter().zip(&axes).map(corner_step).collect(),
+            axes,
             radial_acceleration_share: machine.smoothing.radial_acceleration_share,
             radial_jerk_share: machine.smoothing.radial_jerk_share,
             blend_law: machine.smoothing.blend_law,
             curvature_jump,
             setpoint_period_s,
+            jerk_limited: true,
+            override_ratio: programmed.override_ratio,
+            rapid_override_ratio: programmed.rapid_override_ratio.min(1.0),
+            group,
+            drive: None,
         }
+    }
+
+    /// `None` where no axis has less acceleration at high speed.
+    fn drive_rules(&self, machine: &Machine) -> Option<Box<DriveRules>> {
+        let (mut slow, mut weak) = (self.clone(), self.clone());
+        let mut reduces = false;
+        for (id, axis) in machine.axis_ids().zip(&machine.axes) {
+            let reduction = axis.acceleration_reduction;
+            if reduction.velocity_ratio >= 1.0 || reduction.reduction_ratio <= 0.0 {
+                continue;
+            }
+            reduces = true;
+            let limit_lu_s = reduction.velocity_ratio * axis.limits.velocity_max_lu_s;
+            let slowed = |velocity_lu_s: &mut f64| *velocity_lu_s = velocity_lu_s.min(limit_lu_s);
+            slowed(&mut slow.axes[id.index()].velocity_max_lu_s);
+            slowed(&mut slow.feed_velocities_max_lu_s[id.index()]);
+            weak.axes[id.index()].acceleration_max_lu_s2 *= 1.0 - reduction.reduction_ratio;
+        }
+        reduces.then(|| Box::new(DriveRules { slow, weak }))
     }
 
     /// The axis for which `ratio(axis, its limits)` is largest, the first of equal ones.
@@ -109,8 +184,25 @@ impl AxisRules {
 
     /// Limits of a piece on its curve.
     pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
-        let feed = feed_cap(&piece.feed);
-        let jerk_limited = piece.modes.acceleration_mode == AccelerationMode::Soft;
+        let limits = self.on_curve(piece, curve, ends);
+        let Some(drive) = &self.drive else { return limits };
+        let mut slow = drive.slow.on_curve(piece, curve, ends);
+        if slow.cap.velocity_lu_s >= limits.cap.velocity_lu_s {
+            return limits;
+        }
+        // What holds the speed down is what the axis cannot accelerate above it.
+        if slow.cap.limit.kind == LimitKind::Velocity {
+            let limit = Limit { kind: LimitKind::Acceleration, ..slow.cap.limit };
+            (slow.cap.limit, slow.ramp_cap.limit, slow.bounds.cruise.limit) = (limit, limit, limit);
+        }
+        let weak = drive.weak.on_curve(piece, curve, ends);
+        let length_lu = curve.length_lu();
+        if weak.alone_s(length_lu) < slow.alone_s(length_lu) { weak } else { slow }
+    }
+
+    fn on_curve(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
+        let feed = self.feed_cap(&piece.feed, curve);
+        let jerk_limited = self.jerk_limited;
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
             Curve::Arc(arc) => self.arc(arc, feed, jerk_limited),
@@ -118,25 +210,58 @@ impl AxisRules {
         }
     }
 
+    /// F along s, with OVR.
+    fn feed_cap(&self, feed: &Feed, curve: &Curve) -> FeedCap {
+        let programmed_lu_s = match feed {
+            Feed::Rapid => return FeedCap::Rapid,
+            Feed::Path { feed_lu_s } => *feed_lu_s,
+            Feed::Varying { feeds_lu_s } => feeds_lu_s.iter().copied().fold(f64::INFINITY, f64::min),
+        };
+        let along_lu_s = match &self.group {
+            Some(group) => programmed_lu_s / group.way_ratio(curve),
+            None => programmed_lu_s,
+        };
+        let kind = if self.override_ratio < 1.0 { LimitKind::Override } else { LimitKind::Feed };
+        let velocity_lu_s = along_lu_s * self.override_ratio;
+        FeedCap::Programmed(SpeedCap { velocity_lu_s, limit: Limit { kind, axis: None } })
+    }
+
+    /// The feed and what the velocities of the axes allow; `share` is the largest |q'| of an axis on the piece.
+    pub(super) fn driven(&self, feed: FeedCap, share: impl Fn(AxisId) -> f64) -> SpeedCap {
+        match feed {
+            FeedCap::Programmed(cap) => {
+                let limit = |axis: AxisId| self.feed_velocities_max_lu_s[axis.index()];
+                cap.min(self.largest(|axis, _| share(axis) / limit(axis)).cap(LimitKind::Velocity, 1))
+            }
+            FeedCap::Rapid => {
+                let cap = self.largest(|axis, limits| share(axis) / limits.velocity_max_lu_s);
+                let cap = cap.cap(LimitKind::Velocity, 1);
+                if self.rapid_override_ratio >= 1.0 {
+                    return cap;
+                }
+                let limit = Limit { kind: LimitKind::Override, axis: None };
+                SpeedCap { velocity_lu_s: cap.velocity_lu_s * self.rapid_override_ratio, limit }
+            }
+        }
+    }
+
     /// A line: every axis sees its share of v, a and j.
-    fn line(&self, state: &JointState, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+    fn line(&self, state: &JointState, feed: FeedCap, jerk_limited: bool) -> PieceLimits {
         let share = |axis: AxisId| state.first[axis].abs();
-        let velocity = self.largest(|axis, limits| share(axis) / limits.velocity_max_lu_s);
         let acceleration = self.largest(|axis, limits| share(axis) / limits.acceleration_max_lu_s2);
         let jerk = self.largest(|axis, limits| share(axis) / limits.jerk_max_lu_s3);
-        let cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
+        let cap = self.driven(feed, share);
         PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
     }
 
     /// An arc or helix: the worst direction met on it (models/arcs.md section 4), with the radial shares of models/local-smoothing.md
     /// section 2, so that the sums over tangent and normal hold and not only each term.
-    fn arc(&self, arc: &Arc, feed: SpeedCap, jerk_limited: bool) -> PieceLimits {
+    fn arc(&self, arc: &Arc, feed: FeedCap, jerk_limited: bool) -> PieceLimits {
         let worst = WorstOnArc::new(arc);
         let (ra, rj) = (self.radial_acceleration_share, self.radial_jerk_share);
-        let velocity = self.largest(|axis, limits| worst.first(axis) / limits.velocity_max_lu_s);
         let radial = self.largest(|axis, limits| worst.second(axis) / (ra * limits.acceleration_max_lu_s2));
         let turning = self.largest(|axis, limits| worst.third(axis) / (rj * limits.jerk_max_lu_s3));
-        let mut cap = feed.min(velocity.cap(LimitKind::Velocity, 1));
+        let mut cap = self.driven(feed, |axis| worst.first(axis));
         cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2));
         if jerk_limited {
             cap = cap.min(turning.cap(LimitKind::RadialJerk, 3));
@@ -224,6 +349,13 @@ impl PieceLimits {
         Self { cap, ramp_cap, bounds }
     }
 
+    /// Time from rest to rest.
+    fn alone_s(&self, length_lu: f64) -> f64 {
+        let rest = SpeedCap { velocity_lu_s: 0.0, limit: self.cap.limit };
+        let bounds = Bounds { cruise: self.ramp_cap, ..self.bounds };
+        seven_phases(&Stretch { length_lu, entry: rest, exit: rest }, &bounds).duration_s()
+    }
+
     /// Highest speed at the end of `length_lu` if it is `from` at its start, and what sets it; the same for braking to exactly
     /// `from`.
     pub(super) fn reach(&self, from: SpeedCap, length_lu: f64) -> SpeedCap {
@@ -253,14 +385,18 @@ impl PieceLimits {
     }
 }
 
-/// Programmed feed as a cap; a rapid has none.
-fn feed_cap(feed: &Feed) -> SpeedCap {
-    let velocity_lu_s = match feed {
-        Feed::Rapid => f64::INFINITY,
-        Feed::Path { feed_lu_s } => *feed_lu_s,
-        Feed::Varying { feeds_lu_s } => feeds_lu_s.iter().copied().fold(f64::INFINITY, f64::min),
-    };
-    SpeedCap { velocity_lu_s, limit: Limit { kind: LimitKind::Feed, axis: None } }
+/// Limits of one axis under the modes of a block: its dynamics set, ACC, VELOLIM, JERKLIM.
+pub(super) fn axis_limits(machine: &Machine, id: AxisId, modes: &Modes) -> AxisLimits {
+    let axis = machine.axis(id);
+    let limits = *axis.dynamics.get(modes.dynamics).unwrap_or(&axis.limits);
+    let Some(programmed) = &modes.programmed else { return limits };
+    let (velocity, jerk) = (programmed.velocity_ratio[id], programmed.jerk_ratio[id]);
+    AxisLimits {
+        velocity_max_lu_s: limits.velocity_max_lu_s * velocity,
+        acceleration_max_lu_s2: limits.acceleration_max_lu_s2 * programmed.acceleration_ratio[id],
+        jerk_max_lu_s3: limits.jerk_max_lu_s3 * jerk,
+        transition_jerk_max_lu_s3: limits.transition_jerk_max_lu_s3 * jerk,
+    }
 }
 
 /// Largest |q'|, |q''| and |q'''| of each axis over an arc: axis-parallel directions between its ends included.

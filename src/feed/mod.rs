@@ -4,9 +4,12 @@
 //! `look_ahead.blocks` motion blocks beyond the one that it fixes. Does not sample.
 
 mod blend_limits;
+mod group;
 mod junction;
 mod limits;
+mod modes;
 mod planner;
+mod positioning;
 pub mod profile;
 pub mod ramp;
 mod wire;

@@ -11,18 +11,24 @@
 
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
+use super::modes::ModeRules;
+use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw};
-use crate::base::Diagnostic;
+use crate::base::{Diagnostic, PerAxis};
+use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
 use crate::machine::Machine;
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Plans speeds over a window of the path.
 #[derive(Clone, Debug)]
 pub struct Planner {
-    rules: AxisRules,
+    rules: ModeRules,
+    /// t_s.
+    setpoint_period_s: f64,
     look_ahead_blocks: u32,
     /// The window, then pieces that wait to enter it.
     entries: VecDeque<Entry>,
@@ -40,7 +46,13 @@ pub struct Planner {
     /// Speed at the start of the first piece.
     entry: SpeedCap,
     /// Ends of the last piece pushed that moves, unless the path rests after it.
-    last: Option<Ends>,
+    last: Option<(Ends, Arc<AxisRules>)>,
+    /// Time from the start of the program to the start of the first piece: the sum of all durations before.
+    elapsed_s: f64,
+    /// Of it, time of motions with feed.
+    cutting_s: f64,
+    /// Axes that move on their own.
+    arrivals: Arrivals,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
 }
@@ -82,6 +94,8 @@ enum Motion {
     },
     /// Stands still for a time.
     Waits { time_s: f64 },
+    /// Stands still until these axes have arrived.
+    WaitsFor { axes: PerAxis<bool> },
     /// Takes neither way nor time: speed passes through it.
     Nothing,
 }
@@ -90,7 +104,8 @@ impl Planner {
     /// An empty window on a path that begins at rest.
     pub fn new(machine: &Machine) -> Self {
         Self {
-            rules: AxisRules::new(machine),
+            rules: ModeRules::new(machine),
+            setpoint_period_s: machine.cycle.time_base.setpoint_period_s(),
             look_ahead_blocks: u32::try_from(machine.look_ahead_blocks).unwrap_or(u32::MAX),
             entries: VecDeque::new(),
             admitted: 0,
@@ -101,8 +116,16 @@ impl Planner {
             changed_from: 0,
             entry: STOP,
             last: None,
+            elapsed_s: 0.0,
+            cutting_s: 0.0,
+            arrivals: Arrivals::new(),
             half_blend_lu: 0.0,
         }
+    }
+
+    /// Time of everything that has been handed out, and of the motions with feed among it.
+    pub fn elapsed_s(&self) -> (f64, f64) {
+        (self.elapsed_s, self.cutting_s)
     }
 
     /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken, and no
@@ -118,16 +141,24 @@ impl Planner {
                 let blend = matches!(contour.kind, PieceKind::Blend(..));
                 let (start, end) = (path.at(0.0), path.at(length_lu));
                 let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
-                corner = self.last.map_or(STOP, |before| junction::cap(&self.rules, &before, &ends));
-                let limits = self.rules.piece(contour, curve, &ends);
+                let rules = self.rules.of(&contour.modes);
+                corner = self
+                    .last
+                    .as_ref()
+                    .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
+                let limits = rules.piece(contour, curve, &ends);
                 check_motion(&limits, length_lu, &path)?;
-                self.last = Some(ends);
+                self.last = Some((ends, rules));
                 Motion::Moves { limits, length_lu, block_length_lu: (!blend).then_some(length_lu) }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
                 check_time(*time_s, &path)?;
                 (corner, rests_after) = (STOP, true);
                 Motion::Waits { time_s: *time_s }
+            }
+            PieceKind::WaitPositioned { axes, .. } => {
+                (corner, rests_after) = (STOP, true);
+                Motion::WaitsFor { axes: *axes }
             }
             _ => Motion::Nothing,
         };
@@ -155,8 +186,22 @@ impl Planner {
         self.plan_backward();
         let ahead = if self.admitted > 1 { self.entries[1].entry.cap } else { self.end_of_window().cap };
         let front = self.entries.pop_front()?;
-        let (law, exit) = front.fixed(self.entry, ahead, self.rules.setpoint_period_s);
-        let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond };
+        let machine = self.rules.machine();
+        let events = &front.path.contour.events;
+        let positionings =
+            if events.is_empty() { Vec::new() } else { self.arrivals.set_out(machine, events, self.elapsed_s) };
+        let (law, exit) = match &front.motion {
+            Motion::WaitsFor { axes } => {
+                let (time_s, limit) = self.arrivals.wait(machine, axes, self.elapsed_s);
+                (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
+            }
+            _ => front.fixed(self.entry, ahead, self.setpoint_period_s),
+        };
+        self.elapsed_s += law.duration_s();
+        if matches!(front.motion, Motion::Moves { .. }) && front.path.contour.feed != Feed::Rapid {
+            self.cutting_s += law.duration_s();
+        }
+        let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings };
         self.entry = exit;
         self.admitted -= 1;
         self.changed_from = self.changed_from.saturating_sub(1);
@@ -220,7 +265,7 @@ impl Planner {
                     self.changed_from = self.changed_from.min(before);
                 }
             }
-            Motion::Waits { .. } => self.half_blend_lu = 0.0,
+            Motion::Waits { .. } | Motion::WaitsFor { .. } => self.half_blend_lu = 0.0,
             Motion::Nothing => {}
         }
     }
@@ -261,7 +306,7 @@ impl Planner {
         if before.rests_after || piece.rests_before() {
             return REST;
         }
-        let t_s = self.rules.setpoint_period_s;
+        let t_s = self.setpoint_period_s;
         let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
         let inside = piece.motion.highest_entry(if piece.rests_after { REST } else { exit });
         if inside.cap.velocity_lu_s < junction.velocity_lu_s {
@@ -294,6 +339,8 @@ impl Entry {
                 (seven_phases(&Stretch { length_lu: *length_lu, entry, exit }, &bounds), exit)
             }
             Motion::Waits { time_s } => (standstill(*time_s, Limit { kind: LimitKind::Dwell, axis: None }), STOP),
+            // A wait for axes gets its time where it is handed out.
+            Motion::WaitsFor { .. } => (TimeLaw::new([]), STOP),
             Motion::Nothing => (TimeLaw::new([]), ahead.min(entry)),
         }
     }
@@ -308,7 +355,7 @@ impl Motion {
                 limit: Limit { kind: LimitKind::Cycle, axis: None },
             }),
             Self::Moves { limits, .. } => limits.cap,
-            Self::Waits { .. } => STOP,
+            Self::Waits { .. } | Self::WaitsFor { .. } => STOP,
             Self::Nothing => FREE,
         }
     }
@@ -323,7 +370,7 @@ impl Motion {
                 let limit = if exit == REST { cap.limit } else { exit.cap.limit };
                 Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }
             }
-            Self::Waits { .. } => REST,
+            Self::Waits { .. } | Self::WaitsFor { .. } => REST,
             Self::Nothing => exit,
         }
     }

@@ -41,6 +41,8 @@ pub enum LimitKind {
     Dwell,
     /// Waiting for the axes to come into position.
     InPosition,
+    /// Waiting for an axis that moves on its own (POS, WAITP).
+    Positioning,
     /// Feed override.
     Override,
 }
@@ -61,6 +63,7 @@ impl LimitKind {
             Self::LookAhead => "look_ahead",
             Self::Dwell => "dwell",
             Self::InPosition => "in_position",
+            Self::Positioning => "positioning",
             Self::Override => "override",
         }
     }
@@ -176,4 +179,26 @@ pub struct PlannedPiece {
     pub law: TimeLaw,
     /// Motion blocks that the look-ahead held beyond this one when it was fixed.
     pub buffered_blocks: u32,
+    /// Axes that set out on their own when the piece begins; empty for most.
+    pub positionings: Vec<AxisMotion>,
+}
+
+/// A motion of one axis beside the path, final.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisMotion {
+    /// Which axis.
+    pub axis: AxisId,
+    /// Its whole way, with sign. The path already stands where the axis will arrive: what is left of the way is missing there.
+    pub way_lu: f64,
+    /// From the start of the piece to the start of the motion: not 0 where the axis was still on an earlier way.
+    pub delay_s: f64,
+    /// |way| over time, from rest to rest.
+    pub law: TimeLaw,
+}
+
+impl AxisMotion {
+    /// Time from the start of the piece until the axis has arrived.
+    pub fn arrival_s(&self) -> f64 {
+        self.delay_s + self.law.duration_s()
+    }
 }

@@ -4,6 +4,7 @@
 //! into the next piece, so that no block is rounded to whole cycles.
 
 mod fine;
+mod overlay;
 mod sampler;
 mod wire;
 

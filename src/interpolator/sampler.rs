@@ -7,10 +7,11 @@
 //! the last row is the end posture at rest, on the first tick at or after the end of the last law.
 //! Does not plan, and does not know what events mean.
 
+use super::overlay::Overlay;
 use super::{AxisSetpoint, PathSample, Setpoint};
 use crate::base::{AxisVector, PerAxis, TimeBase};
 use crate::feed::{Limit, LimitKind, PathState, PlannedPiece};
-use crate::interpreter::{Event, Feed};
+use crate::interpreter::{Event, ExactStop, Feed};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 use crate::smoothing::{Corner, PieceKind};
@@ -31,6 +32,8 @@ pub struct Interpolator {
     path_length_mm: f64,
     begun: Vec<Begun>,
     ended: bool,
+    /// Axes on their own way.
+    overlay: Overlay,
 }
 
 /// A piece that began in the cycle that was sampled last.
@@ -44,6 +47,8 @@ pub struct Begun {
     pub stop_at_end: bool,
     /// Path mode in force.
     pub path_mode: PathMode,
+    /// What an exact stop waits for.
+    pub exact_stop: ExactStop,
     /// What is output at its start.
     pub events: Vec<Event>,
     /// The corner, where the piece is a blend.
@@ -88,6 +93,7 @@ impl Interpolator {
             path_length_mm: 0.0,
             begun: Vec::with_capacity(BEGUN_USUAL),
             ended: false,
+            overlay: Overlay::new(machine),
         }
     }
 
@@ -95,6 +101,13 @@ impl Interpolator {
     /// called for every piece that begins at or before k * t_s. `None` after the set-point at the end of the path, or if there is no
     /// path at all.
     pub fn sample(&mut self, k: u64, next: &mut impl FnMut() -> Option<PlannedPiece>) -> Option<Setpoint> {
+        let mut setpoint = self.path_sample(k, next)?;
+        self.overlay.add(k, &mut setpoint.axes);
+        Some(setpoint)
+    }
+
+    /// The set-point of the path alone.
+    fn path_sample(&mut self, k: u64, next: &mut impl FnMut() -> Option<PlannedPiece>) -> Option<Setpoint> {
         self.begun.clear();
         if self.ended {
             return None;
@@ -156,12 +169,15 @@ impl Interpolator {
         {
             self.path_length_mm += active.length_lu;
         }
+        for motion in piece.positionings.drain(..) {
+            self.overlay.set_out(motion, k, carry_s);
+        }
         let programmed_feed_lu_s = programmed_feed_lu_s(&piece);
         let contour = &mut piece.path.contour;
         let events = std::mem::take(&mut contour.events);
         let corner = match &contour.kind {
             PieceKind::Blend(_, corner) => Some(*corner),
-            PieceKind::Block(_) | PieceKind::Wait { .. } => None,
+            PieceKind::Block(_) | PieceKind::Wait { .. } | PieceKind::WaitPositioned { .. } => None,
         };
         let rotary_only = contour.curve().is_some_and(crate::geometry::Curve::rotary_only);
         let length_lu = contour.curve().map_or(0.0, crate::geometry::Curve::length_lu);
@@ -170,6 +186,7 @@ impl Interpolator {
             blocks_begun: contour.blocks_begun,
             stop_at_end: contour.stop_at_end,
             path_mode: contour.modes.path_mode,
+            exact_stop: contour.modes.exact_stop,
             events,
             corner,
             entry_feed_lu_s: piece.law.at(0.0).velocity_lu_s,
@@ -239,7 +256,7 @@ fn takes_no_time(piece: &PlannedPiece) -> bool {
 fn programmed_feed_lu_s(piece: &PlannedPiece) -> Option<f64> {
     let contour = &piece.path.contour;
     match (&contour.kind, &contour.feed) {
-        (PieceKind::Wait { .. }, _) | (_, Feed::Rapid) => None,
+        (PieceKind::Wait { .. } | PieceKind::WaitPositioned { .. }, _) | (_, Feed::Rapid) => None,
         (_, Feed::Path { feed_lu_s }) => Some(*feed_lu_s),
         (_, Feed::Varying { feeds_lu_s }) => feeds_lu_s.first().copied(),
     }

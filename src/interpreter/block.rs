@@ -7,6 +7,7 @@ use super::evaluate::{evaluate, integers, number};
 use super::modal::Motion;
 use super::motion::{AxisWord, MotionWords};
 use super::path_words::CornerWords;
+use super::positioning::PositionWords;
 use super::run::Interpreter;
 use super::value::Value;
 use super::wire::{Event, Move, MoveKind};
@@ -41,6 +42,10 @@ pub(super) struct Collected {
     addresses: Vec<Address>,
     pub feed: Option<(Typed, Columns)>,
     pub spindle_speed_rpm: Option<(f64, Columns)>,
+    /// FB.
+    pub block_feed: Option<(Typed, Columns)>,
+    /// POS, POSA.
+    pub positions: PositionWords,
     pub frame: Option<(FrameWord, Columns)>,
     dwell: Option<Columns>,
     /// RND, CHF, CHR, FRC.
@@ -91,6 +96,7 @@ impl Interpreter {
             let tool_events = std::mem::take(&mut block.tool_events);
             self.emit_function(tool_events, true);
         }
+        self.start_positions(block)?;
         if !block.motion.any() && block.corner.has_shape() {
             let columns = block.corner.columns();
             return Err(Fault::new(codes::BAD_BLOCK, columns, "RND, CHF or CHR in a block without motion")
@@ -107,6 +113,7 @@ impl Interpreter {
         if !events.is_empty() {
             self.emit_function(events, false);
         }
+        self.finish_positions(block);
         Ok(())
     }
 
@@ -160,9 +167,28 @@ impl Interpreter {
         block: &mut Collected,
     ) -> Outcome<()> {
         match address {
+            IndexedAddress::Axis => self.computed_axis(index, values, columns, block),
             IndexedAddress::Polynomial => self.polynomial(index, values, columns, block),
             IndexedAddress::AxisTolerance => self.axis_tolerance(index, values, columns),
             _ => self.feed_indexed(address, index, values, columns, block),
+        }
+    }
+
+    /// AX[axis]=value is the word of that axis.
+    fn computed_axis(
+        &mut self,
+        index: Option<&Expr>,
+        values: &IndexedValue,
+        columns: &Columns,
+        block: &mut Collected,
+    ) -> Outcome<()> {
+        match (index, values) {
+            (Some(index), IndexedValue::One(value)) => {
+                let axis = self.axis_of(index)?;
+                self.address(Address::Axis(axis), value, columns, block)
+            }
+            _ => Err(Fault::new(codes::EXPECTED_VALUE, columns.clone(), "AX needs an axis in its brackets")
+                .label("expected a form such as AX[X]=10")),
         }
     }
 
@@ -250,7 +276,7 @@ impl Interpreter {
         columns: &Columns,
         block: &mut Collected,
     ) -> Outcome<()> {
-        if address != Address::M {
+        if !matches!(address, Address::M | Address::MOf(_) | Address::H) {
             if block.addresses.contains(&address) {
                 return Err(Fault::new(codes::TWICE, columns.clone(), "this address is programmed twice in the block")
                     .label("programmed again"));
@@ -304,7 +330,11 @@ impl Interpreter {
                 }
                 block.events.push(Event::Edge(edge));
             }
-            Address::M => m_function(whole(typed, columns, "M")?, block),
+            Address::M => {
+                let number = whole(typed, columns, "M")?;
+                self.note_spindle(number);
+                m_function(number, block);
+            }
             Address::RoundingDistance => self.modal.rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?),
             Address::RapidRoundingDistance => {
                 self.modal.rapid_rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?)
@@ -368,20 +398,6 @@ impl Interpreter {
         }
     }
 
-    fn take_feed(&mut self, block: &mut Collected) -> Outcome<()> {
-        if let Some((typed, columns)) = block.feed.take() {
-            if typed.0 < FEED_MIN {
-                return Err(Fault::new(codes::BAD_FEED, columns, format!("feed {} is not possible", typed.0))
-                    .label(format!("expected {FEED_MIN} or more")));
-            }
-            self.modal.feed = Some(self.modal.programmed_feed(typed));
-        }
-        if let Some((speed_rpm, _)) = block.spindle_speed_rpm {
-            self.modal.spindle_speed_rpm = speed_rpm;
-        }
-        Ok(())
-    }
-
     /// G4 F (seconds) or G4 S (revolutions): F and S of the path stay as they are.
     fn dwell(&mut self, block: &mut Collected, columns: &Columns) -> Outcome<()> {
         if block.motion.any() || block.frame.is_some() {
@@ -407,16 +423,23 @@ impl Interpreter {
         };
         match (block.feed.take(), block.spindle_speed_rpm.take()) {
             (Some((Typed(time_s), _)), None) => Ok(time_s),
-            (None, Some((_, columns))) if self.modal.spindle_speed_rpm <= 0.0 => {
+            (None, Some((_, columns))) if self.dwell_rpm() <= 0.0 => {
                 Err(missing(&columns, "G4 S counts revolutions, but no spindle speed is programmed"))
             }
             (None, Some((revolutions, _))) => {
                 block.events.retain(|event| !matches!(event, Event::SpindleSpeed { .. }));
-                Ok(revolutions / self.modal.spindle_speed_rpm * S_PER_MIN)
+                Ok(revolutions / self.dwell_rpm() * S_PER_MIN)
             }
             (Some(_), Some((_, columns))) => Err(missing(&columns, "G4 with both F and S")),
             (None, None) => Err(missing(columns, "G4 without a time")),
         }
+    }
+
+    /// Speed of the master spindle; under G96 that where the axes stand.
+    fn dwell_rpm(&self) -> f64 {
+        let modes = &self.modal.feed_modes;
+        let cutting_rpm = if modes.cutting { self.cutting_rpm_here() } else { None };
+        cutting_rpm.unwrap_or_else(|| modes.limited_rpm(self.modal.spindle_speed_rpm))
     }
 }
 

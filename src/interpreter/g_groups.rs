@@ -5,7 +5,7 @@
 use super::modal::Motion;
 use super::run::Interpreter;
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
-use crate::program::words::{Compressor, ExactStop, Measure, Plane};
+use crate::program::words::{Compressor, ExactStop, FeedShape, FeedType, Measure, Plane};
 use crate::program::{Columns, Fault, Outcome, codes};
 
 /// Number of G groups.
@@ -74,12 +74,19 @@ impl Interpreter {
                 Compressor::Cad => 4,
                 Compressor::Surface => 5,
             },
+            37 => match modal.feed_modes.shape {
+                FeedShape::Constant => 1,
+                FeedShape::Linear => 2,
+                FeedShape::Cubic => 3,
+            },
+            55 => 1 + i32::from(modal.feed_modes.rapid_by_axis),
             59 => match modal.dynamics {
                 DynamicsMode::Norm => 1,
                 DynamicsMode::Position => 2,
                 DynamicsMode::Rough => 3,
                 DynamicsMode::SemiFinish => 4,
                 DynamicsMode::Finish => 5,
+                DynamicsMode::Precision => 6,
             },
             1..=GROUPS => 1,
             _ => {
@@ -91,7 +98,21 @@ impl Interpreter {
 
     /// Member of group 15.
     fn feed_type_number(&self) -> i32 {
-        2
+        match self.modal.feed_modes.feed_type {
+            FeedType::InverseTime => 1,
+            FeedType::PerMinute => 2,
+            FeedType::PerRevolution => 3,
+            FeedType::CuttingSpeedPerRevolution => 4,
+            FeedType::SpeedPerRevolution => 5,
+            FeedType::Time => 6,
+            FeedType::CuttingSpeedPerMinute => 7,
+            FeedType::SpeedPerMinute => 8,
+            FeedType::PerMinuteKept => 9,
+            FeedType::PerRevolutionKept => 10,
+            FeedType::CuttingSpeed => 11,
+            FeedType::Speed => 12,
+            FeedType::SpeedPerRevolutionFree => 13,
+        }
     }
 
     /// 0 for G500, 1 for G54 and so on.

@@ -19,10 +19,12 @@
 
 use super::motion::rotary_alone;
 use super::value::trimmed;
-use super::wire::{Compressor, CornerInsert, CornerShape, Event, Feed, Modes, Move, MoveKind, ProgrammedLimits};
+use super::wire::{
+    Compressor, CornerInsert, CornerShape, Event, ExactStop, Feed, Modes, Move, MoveKind, ProgrammedLimits,
+};
 use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
 use crate::base::{AxisId, AxisKind, PartPoint};
-use crate::machine::{AccelerationMode, Axis, Machine, PathMode};
+use crate::machine::{AccelerationMode, Axis, DynamicsMode, Machine, PathMode};
 use std::fmt::Write;
 
 /// Writes moves line by line; remembers the modes of the last one.
@@ -85,10 +87,47 @@ impl<'m> Listing<'m> {
                 AccelerationMode::Drive => "DRIVE".to_owned(),
             });
         }
+        if before.map_or(modes.dynamics != DynamicsMode::Norm, |before| before.dynamics != modes.dynamics) {
+            words.push(format!("DYN={}", modes.dynamics.word()));
+        }
+        if before.map_or(modes.exact_stop != ExactStop::Fine, |before| before.exact_stop != modes.exact_stop) {
+            words.push(
+                match modes.exact_stop {
+                    ExactStop::Fine => "G601",
+                    ExactStop::Coarse => "G602",
+                    ExactStop::Setpoint => "G603",
+                }
+                .to_owned(),
+            );
+        }
         if before.is_none_or(|before| before.feedforward_active != modes.feedforward_active) {
             words.push(if modes.feedforward_active { "FFWON" } else { "FFWOF" }.to_owned());
         }
         words.join(" ")
+    }
+
+    /// ACC and its kin, OVR, FGROUP.
+    fn limit_words(&self, limits: &ProgrammedLimits, words: &mut Vec<String>) {
+        let share = |ratio: f64| trimmed(ratio * 100.0);
+        for id in self.machine.axis_ids() {
+            let Axis { name, kind, .. } = self.machine.axis(id);
+            words.push(format!("ACC[{name}]{}", share(limits.acceleration_ratio[id])));
+            words.push(format!("VELOLIM[{name}]{}", share(limits.velocity_ratio[id])));
+            words.push(format!("JERKLIM[{name}]{}", share(limits.jerk_ratio[id])));
+            let highest = limits.synchronous_max_lu_s[id].map(|feed_lu_s| match kind {
+                AxisKind::Linear => mm_min_from_mm_s(feed_lu_s),
+                AxisKind::Rotary => deg_from_rad(feed_lu_s) * S_PER_MIN,
+            });
+            words.push(format!("FL[{name}]{}", highest.map_or_else(|| "-".to_owned(), trimmed)));
+            words.push(format!("FGREF[{name}]{}", trimmed(limits.reference_radius_mm[id])));
+        }
+        words.push(format!("OVR{}", share(limits.override_ratio)));
+        words.push(format!("OVRRAP{}", share(limits.rapid_override_ratio)));
+        let group = limits.feed_group.map(|group| {
+            let members = self.machine.axis_ids().filter(|id| group[*id]);
+            members.map(|id| self.machine.axis(id).name.as_str()).collect::<Vec<_>>().join(",")
+        });
+        words.push(format!("FGROUP({})", group.unwrap_or_default()));
     }
 
     /// OTOL, ATOL and STOLF; `-` where none is programmed.
@@ -104,6 +143,7 @@ impl<'m> Listing<'m> {
             words.push(format!("ATOL[{name}]{}", shown(customary)));
         }
         words.push(format!("STOLF{}", shown(limits.rapid_tolerance_ratio)));
+        self.limit_words(limits, &mut words);
         words
     }
 }
@@ -246,6 +286,7 @@ fn event_text(event: &Event) -> String {
         Event::Message(text) => format!("MSG({:?})", &**text),
         Event::Trace(starts) => format!("trace={}", if *starts { "start" } else { "stop" }),
         Event::HFunction(value) => format!("H{}", trimmed(*value)),
+        Event::Position(_) => "position".to_owned(),
         Event::Spindle(text) => text.to_string(),
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
+use super::feed_state::FeedModes;
 use super::path_words::ModalCorner;
 use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
 use crate::base::units::S_PER_MIN;
@@ -71,6 +72,8 @@ pub struct Modal {
     pub feedforward_active: bool,
     /// F; `None` before the first.
     pub feed: Option<ProgrammedFeed>,
+    /// What else the feed, spindle and positioning words have said.
+    pub feed_modes: FeedModes,
     /// S; 0 before the first.
     pub spindle_speed_rpm: f64,
     /// TRANS and ATRANS.
@@ -98,6 +101,7 @@ impl Modal {
             tool: None,
             feedforward_active: true,
             feed: None,
+            feed_modes: FeedModes::default(),
             spindle_speed_rpm: 0.0,
             translation_lu: AxisVector::zero(),
         }

@@ -5,10 +5,11 @@
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
 use super::block::FEED_MIN;
-use super::modal::Motion;
+use super::modal::{Motion, ProgrammedFeed};
+use super::path_feed::Way;
 use super::run::Interpreter;
 use super::value::trimmed;
-use super::wire::{ArcGeometry, Event, Feed, MoveKind};
+use super::wire::{ArcGeometry, Event, MoveKind};
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
 use crate::machine::Machine;
@@ -48,6 +49,10 @@ pub(super) struct MotionWords {
     pub turns: u32,
     /// G9.
     pub exact_stop: bool,
+    /// FB.
+    pub block_feed: Option<ProgrammedFeed>,
+    /// F or FB under G93 or G931: time of the block.
+    pub block_time_s: Option<f64>,
     /// SUPA, G53, G153.
     pub suppress_frames: bool,
 }
@@ -60,6 +65,8 @@ impl Default for MotionWords {
             radius: None,
             turns: 0,
             exact_stop: false,
+            block_feed: None,
+            block_time_s: None,
             suppress_frames: false,
         }
     }
@@ -77,7 +84,7 @@ impl MotionWords {
     }
 
     /// Columns of all words of the motion.
-    fn columns(&self) -> Columns {
+    pub(super) fn columns(&self) -> Columns {
         let axes =
             self.axes.as_slice().iter().flatten().chain(self.centre.iter().flatten()).map(|word| word.columns.clone());
         let all = axes.chain(self.radius.iter().map(|(_, columns)| columns.clone()));
@@ -95,17 +102,8 @@ impl Interpreter {
             return Err(Fault::new(codes::BAD_BLOCK, words.columns(), "I, J, K or CR without G2 or G3")
                 .label("only for circles"));
         }
-        if self.modal.motion != Motion::Rapid && self.modal.feed.is_none() {
-            let fault = Fault::new(codes::NO_FEED, words.columns(), "a feed motion, and no F has been programmed")
-                .label("expected F in this block or before it")
-                .help("write F with mm/min, or G0 for a rapid");
-            if !self.setup.lists_only {
-                return Err(fault);
-            }
-            if self.first_report(codes::NO_FEED) {
-                self.report(*fault);
-            }
-        }
+        let named = PerAxis::from_fn(|id| words.axes[id].is_some());
+        self.wait_for_moving(named);
         let kind = match self.modal.motion {
             Motion::Rapid => MoveKind::Rapid,
             Motion::Line => MoveKind::Line,
@@ -114,7 +112,12 @@ impl Interpreter {
         self.check_travel(words, end);
         self.note_applied(words);
         self.position = end;
-        let feed = self.feed_of(start, end, matches!(kind, MoveKind::Arc(_)));
+        if kind == MoveKind::Rapid && self.rapid_by_axis(words.exact_stop) {
+            self.position = start;
+            self.rapid_axes(end, named, std::mem::take(events));
+            return Ok(());
+        }
+        let feed = self.feed_of(Way { start, end, kind: &kind }, words)?;
         self.emit(kind, feed, words.exact_stop, std::mem::take(events));
         Ok(())
     }
@@ -131,7 +134,8 @@ impl Interpreter {
             Some(_) => return false,
             None => self.modal.feed,
         };
-        let straight = motion == Motion::Rapid || (motion == Motion::Line && feed.is_some());
+        let feed_known = motion == Motion::Rapid || (motion == Motion::Line && feed.is_some());
+        let straight = feed_known && self.modal.feed_modes.plain;
         let start = self.position;
         let mut end = start;
         let machine = &self.machine;
@@ -163,28 +167,14 @@ impl Interpreter {
         if block.axes.as_slice().iter().any(Option::is_some) {
             self.position = end;
             let kind = if motion == Motion::Rapid { MoveKind::Rapid } else { MoveKind::Line };
-            let feed = self.feed_of(start, end, false);
+            let feed = self.plain_feed(start, end);
             self.emit(kind, feed, false, Vec::new());
         }
         true
     }
 
-    /// Feed of moves that stand still.
-    pub(super) fn standing_feed(&self) -> Feed {
-        match (self.modal.motion, self.modal.feed) {
-            (Motion::Rapid, _) | (_, None) => Feed::Rapid,
-            (_, Some(feed)) => Feed::Path { feed_lu_s: feed.linear_mm_s },
-        }
-    }
-
-    fn feed_of(&self, start: PartPoint, end: PartPoint, is_arc: bool) -> Feed {
-        let Some(feed) = self.modal.feed.filter(|_| self.modal.motion != Motion::Rapid) else { return Feed::Rapid };
-        let rotary = !is_arc && rotary_alone(&self.machine, start, end);
-        Feed::Path { feed_lu_s: if rotary { feed.rotary_rad_s } else { feed.linear_mm_s } }
-    }
-
     /// All axes at the end of the block.
-    fn end_point(&self, words: &MotionWords) -> Outcome<PartPoint> {
+    pub(super) fn end_point(&self, words: &MotionWords) -> Outcome<PartPoint> {
         let mut end = self.position;
         for id in self.machine.axis_ids() {
             if let Some(word) = &words.axes[id] {
@@ -230,7 +220,7 @@ impl Interpreter {
         .label("expected AC or IC"))
     }
 
-    fn note_applied(&mut self, words: &MotionWords) {
+    pub(super) fn note_applied(&mut self, words: &MotionWords) {
         let suppressed = words.suppress_frames;
         for id in self.machine.clone().axis_ids() {
             let Some(word) = &words.axes[id] else { continue };
@@ -314,7 +304,7 @@ impl Interpreter {
     }
 
     /// One warning per axis and run.
-    fn check_travel(&mut self, words: &MotionWords, end: PartPoint) {
+    pub(super) fn check_travel(&mut self, words: &MotionWords, end: PartPoint) {
         let machine = self.machine.clone();
         for id in machine.axis_ids() {
             let axis = machine.axis(id);

@@ -13,6 +13,7 @@ use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
 use crate::program::syntax::{Direction, Statement};
+use crate::program::visit::priority_trap;
 use crate::program::{
     Block, BlockRef, Columns, Cursor, Dialect, Fault, NotActedOn, OpenedProgram, Outcome, ProgramId, ProgramSource,
     codes, parse,
@@ -227,12 +228,22 @@ impl Interpreter {
             return Ok(kept.clone());
         }
         let block = Arc::new(parse(&self.source.decode(bytes), &self.dialect)?);
+        if let Some(columns) = priority_trap(&block.statement) {
+            self.warn_of_priority(columns);
+        }
         let is_short = bytes.len() <= KEPT_LINE_BYTES_MAX;
         if line <= self.furthest_line && is_short && self.kept_blocks.len() < KEPT_BLOCKS_MAX {
             self.kept_blocks.insert(line, block.clone());
         }
         self.furthest_line = self.furthest_line.max(line);
         Ok(block)
+    }
+
+    /// Once a run; `check` finds all of them.
+    fn warn_of_priority(&mut self, columns: Columns) {
+        if self.first_report(codes::PRIORITY_TRAP) {
+            self.warn(*priority_fault(columns));
+        }
     }
 
     /// M2, M30, M17, RET or the end of the text.
@@ -302,4 +313,11 @@ impl Interpreter {
             .label("executed again and again")
             .help("check the condition of the loop or jump")
     }
+}
+
+/// The finding for a condition that is read otherwise than it looks.
+pub(super) fn priority_fault(columns: Columns) -> Box<Fault> {
+    Fault::new(codes::PRIORITY_TRAP, columns, "AND, OR and XOR bind tighter than a comparison")
+        .label("read as one comparison of a combined value")
+        .help("write brackets around each comparison: (A == 1) AND (B == 2)")
 }

@@ -112,10 +112,23 @@ pub struct PolynomialPiece {
 pub struct AxisPositioning {
     /// Which axis.
     pub axis: AxisId,
-    /// Where to, from where it was told to go last.
+    /// From where it was told to go last.
+    pub start_lu: f64,
+    /// Where to.
     pub end_lu: f64,
-    /// FA; `None`: as fast as it can.
+    /// FA with OVRA; `None`: as fast as it can.
     pub feed_lu_s: Option<f64>,
+    /// SOFTA; false: BRISKA or DRIVEA.
+    pub jerk_limited: bool,
+}
+
+/// Axes that set out on their own, with what then held about their limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Positioning {
+    /// Each axis once.
+    pub axes: Arc<[AxisPositioning]>,
+    /// ACC, VELOLIM, JERKLIM.
+    pub programmed: Option<Arc<ProgrammedLimits>>,
 }
 
 /// What RND, RNDM, CHF or CHR put into a corner.
@@ -203,9 +216,9 @@ pub struct ProgrammedLimits {
     pub jerk_ratio: PerAxis<f64>,
     /// FL: highest velocity of a synchronous axis (one outside FGROUP) in feed motions.
     pub synchronous_max_lu_s: PerAxis<Option<f64>>,
-    /// OVR: share of the programmed feed; of rapids where it is below 1.
+    /// OVR: share of the programmed feed.
     pub override_ratio: f64,
-    /// OVRRAP: share of the rapid velocity.
+    /// OVRRAP: share of the rapid velocity; more than 1 is 1.
     pub rapid_override_ratio: f64,
     /// OTOL: tolerance of rotary axes.
     pub orientation_tolerance_rad: Option<f64>,
@@ -300,6 +313,8 @@ pub enum Event {
     Trace(bool),
     /// H function.
     HFunction(f64),
+    /// Axes set out on their own (smoothing makes it of a `MoveKind::Position`).
+    Position(Arc<Positioning>),
     /// S, M of a spindle other than the master spindle, SPOS: as text, such as "S2=500".
     Spindle(Arc<str>),
 }

@@ -7,6 +7,7 @@ use crate::base::{AxisId, PerAxis};
 use crate::drive::AxisSignals;
 use crate::feed::Limit;
 use crate::interpolator::{Begun, Setpoint};
+use crate::interpreter::ExactStop;
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 use crate::smoothing::Corner;
@@ -37,7 +38,7 @@ pub struct Figures {
     pub corners: Vec<(BlockRef, Corner, f64)>,
     /// All corners.
     pub corners_total: u64,
-    /// Blocks that end in an exact stop of the program.
+    /// Blocks that end in an exact stop which waits for the axes (G601, G602).
     pub exact_stops: u64,
     /// Per axis.
     pub axes: PerAxis<AxisFigures>,
@@ -110,8 +111,8 @@ impl Figures {
     /// Counts a piece that begins.
     pub(super) fn piece(&mut self, begun: &Begun) {
         self.blocks += u64::from(begun.blocks_begun);
-        self.exact_stops +=
-            u64::from(begun.stop_at_end && begun.path_mode == PathMode::ExactStop && begun.length_lu > 0.0);
+        let stops = begun.stop_at_end && begun.path_mode == PathMode::ExactStop;
+        self.exact_stops += u64::from(stops && begun.length_lu > 0.0 && begun.exact_stop != ExactStop::Setpoint);
         if !begun.rotary_only {
             self.path_length_mm += begun.length_lu;
         }

@@ -4,12 +4,15 @@
 //! planner, never in time, so that threads change nothing. An alarm of the interpreter or of feed stops preparation; everything before
 //! it is planned to rest and handed out first, as on the control.
 
-use crate::base::Diagnostic;
+use crate::base::{Diagnostic, TimeBase};
 use crate::feed::{PlannedPiece, Planner};
-use crate::interpreter::{Interpreter, Setup};
+use crate::interpreter::{Interpreter, MainRun, MoveKind, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
 use crate::smoothing::{ContourPiece, Smoother};
+
+/// A path that ends this share of its time after a set-point ends on it, as for the interpolator.
+const SAME_TIME_RATIO: f64 = 1e-9;
 
 /// Where the cycle gets its pieces from: preparation itself, or a channel to the thread it runs on.
 pub trait PieceSource {
@@ -39,6 +42,9 @@ pub struct Preparation {
     warnings: Vec<Diagnostic>,
     alarm: Option<Diagnostic>,
     finished: bool,
+    time_base: TimeBase,
+    /// The interpreter waits for the time at which the path rests.
+    stopped: bool,
 }
 
 impl Preparation {
@@ -52,12 +58,18 @@ impl Preparation {
             warnings: Vec::new(),
             alarm: None,
             finished: false,
+            time_base: machine.cycle.time_base,
+            stopped: false,
         }
     }
 
     /// Executes one more block of the program and plans what follows from it.
     fn extend(&mut self) {
+        if std::mem::take(&mut self.stopped) {
+            self.interpreter.tell_main_run(self.main_run());
+        }
         let moved = self.interpreter.next_move();
+        self.stopped = matches!(&moved, Ok(Some(next)) if next.kind == MoveKind::StopPreparation);
         let Self { smoother, kinematics, planner, .. } = self;
         let mut refused = None;
         let mut plan = |piece: ContourPiece| {
@@ -85,6 +97,15 @@ impl Preparation {
         if self.finished {
             self.planner.finish();
         }
+    }
+
+    /// Where the path rests that has been handed out: at the first set-point at or after its end. Counted from planned durations,
+    /// so that it does not depend on how far the cycle is.
+    fn main_run(&self) -> MainRun {
+        let (elapsed_s, cutting_time_s) = self.planner.elapsed_s();
+        let period_s = self.time_base.setpoint_period_s();
+        let k = (elapsed_s / period_s * (1.0 - SAME_TIME_RATIO)).ceil().max(0.0) as u64;
+        MainRun { time_s: self.time_base.time_s(self.time_base.setpoint_tick(k)), cutting_time_s }
     }
 
     /// Warnings since the last call, in the order in which blocks gave rise to them.

@@ -177,7 +177,10 @@ fn limit_shares(machine: &Machine, figures: &Figures) -> BTreeMap<String, f64> {
 /// The contract's keys without an axis: feed, corner, cycle, look_ahead, dwell, in_position, override.
 fn carries_axis(limit: Limit) -> bool {
     use crate::feed::LimitKind::*;
-    matches!(limit.kind, Velocity | Acceleration | Jerk | RadialAcceleration | RadialJerk | TransitionJerk)
+    matches!(
+        limit.kind,
+        Velocity | Acceleration | Jerk | RadialAcceleration | RadialJerk | TransitionJerk | Positioning
+    )
 }
 
 fn axis_json(kind: AxisKind, figures: &AxisFigures, drives: bool) -> Value {

@@ -26,7 +26,7 @@ impl JointPath {
                     third: state.third,
                 }
             }
-            PieceKind::Wait { at, .. } => {
+            PieceKind::Wait { at, .. } | PieceKind::WaitPositioned { at, .. } => {
                 let still = AxisVector::zero();
                 JointState { position: MachinePoint(at.0), first: still, second: still, third: still }
             }

@@ -3,7 +3,7 @@
 //! In: the section `axes`. Out: [`Axis`] values in order of their index, with the cycles of their drives still as ratios (see
 //! `clock`). Checks names, indices, limits, travel and home. The drive is read in `drive`.
 
-use super::checked::{Axis, AxisDynamics, AxisLimits, DynamicsMode};
+use super::checked::{AccelerationReduction, Axis, AxisDynamics, AxisLimits, DynamicsMode};
 use super::clock::LoopCycles;
 use super::document::Entry;
 use super::drive;
@@ -73,6 +73,10 @@ fn axis<'f>(parent: &Section<'f>, entry: &'f Entry) -> AxisDraft<'f> {
         machine_axis: section.text("machine_axis").map(str::to_owned),
         limits,
         dynamics: dynamics(&section, &limits),
+        acceleration_reduction: AccelerationReduction {
+            velocity_ratio: section.number("acceleration_reduction_velocity_ratio"),
+            reduction_ratio: section.number("acceleration_reduction_ratio"),
+        },
         follow_up_tolerance_lu: lu(
             kind,
             section.number(by_kind(kind, "follow_up_tolerance_mm", "follow_up_tolerance_deg")),
@@ -223,8 +227,6 @@ fn dynamics(axis: &Section<'_>, limits_of_axis: &AxisLimits) -> AxisDynamics {
         };
         let set = section.table(&entry.key, "axes.*.dynamics.*");
         dynamics.set(mode, limits(&set, Some(limits_of_axis)));
-        let message = format!("[{}] is read and checked, but not acted on yet: the limits of the axis hold", set.path);
-        section.report(&entry.key_mark, "not acted on yet", Diagnostic::warning("M0102", message));
     }
     dynamics
 }

@@ -63,6 +63,22 @@ pub(super) const AXIS: &[Key] = &[
         .md("MD36110, MD36100"),
     Key::new("home_mm", "mm", ANY, Value(0.0), "where the axis stands at program start").linear("home_deg"),
     Key::new("home_deg", "deg", ANY, Value(0.0), "where the axis stands at program start").rotary("home_mm"),
+    Key::new(
+        "acceleration_reduction_velocity_ratio",
+        "",
+        Number(Range::UpTo(0.0, 1.0)),
+        Value(1.0),
+        "DRIVE: share of the velocity limit above which the acceleration is lower",
+    )
+    .md("MD35220"),
+    Key::new(
+        "acceleration_reduction_ratio",
+        "",
+        Number(Range::Within(0.0, 0.95)),
+        Value(0.0),
+        "DRIVE: share of the acceleration that is taken off there",
+    )
+    .md("MD35230"),
     Key::new("modulo", "", Flag, No, "endless rotary axis, without travel").rotary("").md("MD30310"),
 ];
 

@@ -261,8 +261,10 @@ pub struct Axis {
     pub machine_axis: Option<String>,
     /// Velocity, acceleration, jerk.
     pub limits: AxisLimits,
-    /// `[axes.*.dynamics.*]`: limits of DYNNORM .. DYNFINISH where they differ. Read and checked, not acted on yet.
+    /// `[axes.*.dynamics.*]`: limits of DYNNORM .. DYNPREC where they differ.
     pub dynamics: AxisDynamics,
+    /// DRIVE: what is taken off the acceleration at high speed.
+    pub acceleration_reduction: AccelerationReduction,
     /// e of the corner rule.
     pub follow_up_tolerance_lu: f64,
     /// Software limits, if any.
@@ -288,6 +290,15 @@ pub struct AxisLimits {
     pub transition_jerk_max_lu_s3: f64,
 }
 
+/// DRIVE: less acceleration at high speed, as the torque of a motor falls there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AccelerationReduction {
+    /// MD35220: share of the velocity limit above which the acceleration is lower; 1: nowhere.
+    pub velocity_ratio: f64,
+    /// MD35230: share of the acceleration that is taken off there; 0: nothing.
+    pub reduction_ratio: f64,
+}
+
 /// G group 59: what an axis may do in a kind of machining.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DynamicsMode {
@@ -301,11 +312,14 @@ pub enum DynamicsMode {
     SemiFinish,
     /// DYNFINISH, `[axes.*.dynamics.finish]`.
     Finish,
+    /// DYNPREC, `[axes.*.dynamics.precision]`; where that is missing, as DYNFINISH.
+    Precision,
 }
 
 impl DynamicsMode {
-    /// All five, in the order of the machine-data index.
-    pub const ALL: [Self; 5] = [Self::Norm, Self::Position, Self::Rough, Self::SemiFinish, Self::Finish];
+    /// All six, in the order of the machine-data index.
+    pub const ALL: [Self; 6] =
+        [Self::Norm, Self::Position, Self::Rough, Self::SemiFinish, Self::Finish, Self::Precision];
 
     /// Its name in a machine file.
     pub fn word(self) -> &'static str {
@@ -315,18 +329,21 @@ impl DynamicsMode {
             Self::Rough => "rough",
             Self::SemiFinish => "semifinish",
             Self::Finish => "finish",
+            Self::Precision => "precision",
         }
     }
 }
 
-/// The five dynamics sets of an axis; the default is none, so that the limits of the axis hold in every mode.
+/// The six dynamics sets of an axis; the default is none, so that the limits of the axis hold in every mode.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct AxisDynamics([Option<AxisLimits>; 5]);
+pub struct AxisDynamics([Option<AxisLimits>; 6]);
 
 impl AxisDynamics {
-    /// The limits given for a mode; `None`: those of the axis hold.
+    /// The limits given for a mode; `None`: those of the axis hold. DYNPREC without a set of its own is DYNFINISH: controls that
+    /// have five sets know no more.
     pub fn get(&self, mode: DynamicsMode) -> Option<&AxisLimits> {
-        self.0[mode as usize].as_ref()
+        let given = self.0[mode as usize].as_ref();
+        if mode == DynamicsMode::Precision { given.or(self.0[DynamicsMode::Finish as usize].as_ref()) } else { given }
     }
 
     /// Gives a mode limits of its own.

@@ -114,5 +114,7 @@ codes! {
     TRAVEL "W0002" "A position outside the travel of an axis";
     CHECK_STOPPED "W0003" "The check did not run the program to its end";
     NO_TOOL_DATA "W0004" "A tool or tool edge without data: its length and radius count as 0";
+    PRIORITY_TRAP "W0005" "AND, OR or XOR beside a comparison, without brackets";
+    LATE_DEFINITION "W0006" "A DEF behind the first executable block";
     RAISED_AND_SHOWN "W0007" "An alarm of the program that does not stop it (SETAL)";
 }

@@ -18,7 +18,7 @@ mod statements;
 pub mod structure;
 pub mod syntax;
 mod system_variables;
-mod visit;
+pub mod visit;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};

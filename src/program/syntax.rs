@@ -482,6 +482,11 @@ pub enum Binary {
 }
 
 impl Binary {
+    /// ==, <> and so on.
+    pub fn compares(self) -> bool {
+        self.priority() == 1
+    }
+
     /// How tightly it binds: the control's order (programming manual 12/2019, p. 444). AND binds tighter than ==.
     pub fn priority(self) -> u8 {
         match self {

@@ -2,9 +2,10 @@
 //!
 //! In: a [`Statement`]. Out: its expressions, one after another, innermost included. Does not evaluate.
 
+use super::codes::Columns;
 use super::syntax::{
-    Case, Definition, Destination, Expr, ExprKind, IndexedValue, Initial, Jump, Statement, SystemName, Target, Word,
-    WordKind,
+    Binary, Case, Definition, Destination, Expr, ExprKind, IndexedValue, Initial, Jump, Statement, SystemName, Target,
+    Word, WordKind,
 };
 use super::system_variables::SystemVariable;
 
@@ -40,6 +41,29 @@ pub fn reads_main_run(statement: &Statement) -> bool {
         }
     });
     found
+}
+
+/// A comparison whose operand is an AND, OR or XOR without brackets, or a second comparison: `A == 1 AND B == 2` compares `A` with
+/// `1 AND B`. The control takes it without a word; what is marked is the whole of it.
+pub fn priority_trap(statement: &Statement) -> Option<Columns> {
+    let mut found = None;
+    visit_expressions(statement, &mut |expression| {
+        if let ExprKind::Binary(operator, operands) = &expression.kind
+            && operator.compares()
+            && [&operands.0, &operands.1].into_iter().any(bare_condition)
+        {
+            // The outermost one is met first.
+            found.get_or_insert(expression.columns.clone());
+        }
+    });
+    found
+}
+
+/// A condition without brackets of its own: with them its columns would begin before those of its first operand.
+fn bare_condition(operand: &Expr) -> bool {
+    let ExprKind::Binary(operator, operands) = &operand.kind else { return false };
+    let is_condition = operator.compares() || matches!(operator, Binary::And | Binary::Or | Binary::Xor);
+    is_condition && operand.columns.start == operands.0.columns.start
 }
 
 fn visit_word(word: &Word, visit: &mut impl FnMut(&Expr)) {

@@ -242,6 +242,8 @@ pub enum Suppression {
 /// NAME[axis]=value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IndexedAddress {
+    /// AX: an axis word whose axis is computed.
+    Axis,
     /// ACC.
     Acceleration,
     /// VELOLIM.
@@ -671,6 +673,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("COMPCURV", Role::Keyword(Keyword::Compressor(Compressor::Curvature))),
     ("COMPCAD", Role::Keyword(Keyword::Compressor(Compressor::Cad))),
     ("COMPSURF", Role::Keyword(Keyword::Compressor(Compressor::Surface))),
+    ("AX", Role::Indexed(IndexedAddress::Axis)),
     ("ACC", Role::Indexed(IndexedAddress::Acceleration)),
     ("VELOLIM", Role::Indexed(IndexedAddress::Velocity)),
     ("JERKLIM", Role::Indexed(IndexedAddress::Jerk)),

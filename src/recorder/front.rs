@@ -131,7 +131,9 @@ impl Recorder {
         if let Event::ProgramOpened(program) = event {
             self.attach_program(tick, program);
         }
-        self.event(tick, Some(block), event.into());
+        if !matches!(event, Event::Position(_)) {
+            self.event(tick, Some(block), event.into());
+        }
     }
 
     /// Attaches a program that was found only at run time. A program that is attached already is not attached again.

@@ -13,9 +13,9 @@ use super::corner::{Junction, Rules, Side};
 use super::unrounded::Unrounded;
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
-use crate::base::{Diagnostic, PartPoint};
+use crate::base::{Diagnostic, PartPoint, PerAxis};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
-use crate::interpreter::{Event, Feed, Modes, Move, MoveKind};
+use crate::interpreter::{AxisPositioning, Event, Feed, Modes, Move, MoveKind, Positioning};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 
@@ -29,6 +29,8 @@ pub struct Smoother {
     /// case that no piece follows.
     carried: Option<Head>,
     unrounded: Unrounded,
+    /// Axes that POSA has sent away: the program ends when they have arrived.
+    positioned: PerAxis<bool>,
 }
 
 /// The motion block whose end is not decided yet.
@@ -57,7 +59,14 @@ impl Smoother {
         for axis in machine.axis_ids() {
             position.0[axis] = machine.axis(axis).home_lu;
         }
-        Self { rules: Rules::new(machine), position, held: None, carried: None, unrounded: Unrounded::default() }
+        Self {
+            rules: Rules::new(machine),
+            position,
+            held: None,
+            carried: None,
+            unrounded: Unrounded::default(),
+            positioned: PerAxis::splat(false),
+        }
     }
 
     /// Takes the next move; hands over the pieces that it decides.
@@ -73,7 +82,7 @@ impl Smoother {
                 let arc = Arc::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Arc(arc), out);
             }
-            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) | MoveKind::Position(_) => {
+            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
                 let line = Line::new(self.position, next.end, linear);
                 self.push_motion(next, Curve::Line(line), out);
             }
@@ -81,7 +90,17 @@ impl Smoother {
                 let time_s = *time_s;
                 self.push_wait(next, time_s, out);
             }
-            MoveKind::WaitPositioned(_) | MoveKind::StopPreparation => self.push_wait(next, 0.0, out),
+            MoveKind::Position(axes) => {
+                let axes = axes.clone();
+                self.push_positioning(next, axes);
+            }
+            MoveKind::WaitPositioned(axes) => {
+                let axes = *axes;
+                self.rest(out);
+                let head = self.head(next, 0);
+                out(self.wait_positioned(head, axes));
+            }
+            MoveKind::StopPreparation => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: true } => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: false } => self.carry(next, 0),
         }
@@ -89,10 +108,38 @@ impl Smoother {
 
     /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
     pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        let last = self.held.as_ref().map(|held| Head { events: Vec::new(), blocks_begun: 0, ..held.head.clone() });
         self.rest(out);
-        if let Some(carried) = self.carried.take() {
-            out(self.wait(carried, 0.0));
+        let carried = self.carried.take();
+        let waits = self.positioned.as_slice().contains(&true);
+        match carried.or(last.filter(|_| waits)) {
+            Some(head) if waits => {
+                let positioned = self.positioned;
+                out(self.wait_positioned(head, positioned));
+            }
+            Some(head) => out(self.wait(head, 0.0)),
+            None => {}
         }
+    }
+
+    /// The path goes on where the axes will arrive: what is missing on the way is added to the path by feed and interpolator.
+    fn push_positioning(&mut self, next: Move, axes: std::sync::Arc<[AxisPositioning]>) {
+        for axis in axes.iter() {
+            self.positioned[axis.axis] = true;
+            self.position.0[axis.axis] = axis.end_lu;
+        }
+        let programmed = next.modes.programmed.clone();
+        let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
+        let mut events = next.events.clone();
+        events.push(start);
+        self.carry(Move { events, ..next }, 1);
+    }
+
+    fn wait_positioned(&mut self, head: Head, axes: PerAxis<bool>) -> ContourPiece {
+        for (positioned, waits) in self.positioned.as_mut_slice().iter_mut().zip(axes.as_slice()) {
+            *positioned &= !waits;
+        }
+        head.piece(PieceKind::WaitPositioned { axes, at: self.position }, true)
     }
 
     /// Findings since the last call.
@@ -185,7 +232,10 @@ impl Smoother {
         let Move { block, feed, modes, mut events, .. } = next;
         let mut blocks_begun = blocks;
         if let Some(mut carried) = self.carried.take() {
-            blocks_begun += carried.blocks_begun;
+            // Words of one block may make several moves: they count as one.
+            let shared = carried.block.number == block.number && carried.block.program == block.program;
+            blocks_begun =
+                if shared { blocks_begun.max(carried.blocks_begun) } else { blocks_begun + carried.blocks_begun };
             carried.events.append(&mut events);
             events = carried.events;
         }

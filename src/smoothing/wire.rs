@@ -2,6 +2,7 @@
 //!
 //! In: nothing (plain data). Out: [`ContourPiece`]. Does not know speed or machine space.
 
+use crate::base::{PartPoint, PerAxis};
 use crate::geometry::Curve;
 use crate::interpreter::{Event, Feed, Modes};
 use crate::program::BlockRef;
@@ -33,12 +34,19 @@ pub enum PieceKind {
     Block(Curve),
     /// An inserted corner blend.
     Blend(Curve, Corner),
+    /// Stands still until these axes have arrived that move on their own.
+    WaitPositioned {
+        /// Which axes.
+        axes: PerAxis<bool>,
+        /// Position, unchanged.
+        at: PartPoint,
+    },
     /// Stands still: a dwell, or a function block (0 s).
     Wait {
         /// Length of the wait.
         time_s: f64,
         /// Position, unchanged.
-        at: crate::base::PartPoint,
+        at: PartPoint,
     },
 }
 
@@ -58,7 +66,7 @@ impl ContourPiece {
     pub fn curve(&self) -> Option<&Curve> {
         match &self.kind {
             PieceKind::Block(curve) | PieceKind::Blend(curve, _) => Some(curve),
-            PieceKind::Wait { .. } => None,
+            PieceKind::Wait { .. } | PieceKind::WaitPositioned { .. } => None,
         }
     }
 }

@@ -312,16 +312,16 @@ fn a_drive_that_cannot_reach_its_velocity_is_a_warning() {
 }
 
 #[test]
-fn dynamics_sets_are_kept_and_not_acted_on() {
+fn dynamics_sets_are_kept() {
     let sets = "\n[axes.X.dynamics.finish]\njerk_max_m_s3 = 5\n\n[axes.X.dynamics.rough]\nvelocity_max_m_min = 15\n";
     let loaded = parse(&format!("{MINIMAL}{sets}")).unwrap_or_else(|found| panic!("{}", shown(&found)));
-    assert_says(&shown(&loaded.warnings), &["[axes.X.dynamics.finish]", "not acted on yet"]);
     let axis = &loaded.machine.axes[0];
     let finish = axis.dynamics.get(machine::DynamicsMode::Finish).expect("finish");
     assert_eq!((finish.jerk_max_lu_s3, finish.transition_jerk_max_lu_s3), (5e3, 5e3));
     assert_eq!(finish.velocity_max_lu_s, axis.limits.velocity_max_lu_s);
     assert_eq!(axis.dynamics.get(machine::DynamicsMode::Rough).expect("rough").velocity_max_lu_s, 250.0);
     assert_eq!(axis.dynamics.get(machine::DynamicsMode::Norm), None);
+    assert_eq!(axis.dynamics.get(machine::DynamicsMode::Precision).expect("as finish").jerk_max_lu_s3, 5e3);
     let wrong = format!("{MINIMAL}\n[axes.X.dynamics.finnish]\njerk_max_m_s3 = 5\n");
     assert_says(&only_error(&wrong), &["unknown dynamics set axes.X.dynamics.finnish", "did you mean finish?"]);
     let wrong = format!("{MINIMAL}\n[axes.X.dynamics.finish]\njerk_max_m_s3 = -5\n");
