@@ -199,6 +199,7 @@ impl Interpreter {
     ) -> Outcome<()> {
         match procedure {
             Procedure::HighSpeedSettings => self.high_speed_settings(given, columns),
+            Procedure::RaiseAlarm => self.raise_alarm(given, columns),
             _ => self.feed_procedure(procedure, given, columns, block),
         }
     }

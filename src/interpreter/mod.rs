@@ -16,6 +16,7 @@
 //! * G601 is what is done; G602 and G603 are reported. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
 mod active_frames;
+mod alarm;
 mod arc;
 mod block;
 mod call;
@@ -41,6 +42,7 @@ mod positioning;
 mod run;
 mod setup;
 mod strings;
+mod system_constants;
 mod system_values;
 mod tool_variables;
 mod tool_words;

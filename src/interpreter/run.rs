@@ -267,6 +267,7 @@ impl Interpreter {
         }
         let block = self.parsed(&bytes)?;
         if block.reads_main_run && !std::mem::replace(&mut self.rests_for_main_run, true) {
+            self.report_plc_reads(&block);
             // The block itself is executed when the path rests.
             self.next = self.current;
             self.emit(MoveKind::StopPreparation, self.standing_feed(), false, Vec::new());

@@ -260,7 +260,10 @@ impl Variables {
             return character(&variable.values[place], at, columns);
         }
         let place = variable.place(name, indices, columns)?;
-        Ok(variable.values[place].clone())
+        Ok(match (variable.variable_type, &variable.values[place]) {
+            (VariableType::Char, Value::Int(code)) => Value::Char(character_of(*code)),
+            (_, value) => value.clone(),
+        })
     }
 
     /// Sets a variable or array element, converted to its type.
@@ -321,19 +324,27 @@ pub fn undeclared(name: &str, near: Option<&str>, columns: &Columns) -> Box<Faul
 
 /// Character `at` of a text, as CHAR.
 fn character(text: &Value, at: i32, columns: &Columns) -> Outcome<Value> {
-    let Value::Text(text) = text else { return Ok(Value::Int(0)) };
+    let Value::Text(text) = text else { return Ok(Value::Char('\0')) };
     let found = usize::try_from(at).ok().and_then(|at| text.chars().nth(at));
-    found.map(|found| Value::Int(found as i32)).ok_or_else(|| no_character(text, at, columns))
+    found.map(Value::Char).ok_or_else(|| no_character(text, at, columns))
 }
 
-/// The text with another character `at`; just behind its end it grows.
+/// The character of a code.
+fn character_of(code: i32) -> char {
+    u32::try_from(code).ok().and_then(char::from_u32).unwrap_or('\0')
+}
+
+/// The text with another character `at`; the character 0 ends it there.
 fn with_character(text: &Value, at: i32, code: &Value, columns: &Columns) -> Outcome<Value> {
     let (Value::Text(text), Value::Int(code)) = (text, code) else { return Ok(text.clone()) };
     let mut characters: Vec<char> = text.chars().collect();
-    let new = u32::try_from(*code).ok().and_then(char::from_u32).unwrap_or(' ');
-    match usize::try_from(at).ok().and_then(|at| characters.get_mut(at)) {
-        Some(old) => *old = new,
-        None => return Err(no_character(text, at, columns)),
+    let new = character_of(*code);
+    let Some(at) = usize::try_from(at).ok().filter(|at| *at < characters.len()) else {
+        return Err(no_character(text, at, columns));
+    };
+    characters[at] = new;
+    if new == '\0' {
+        characters.truncate(at);
     }
     Ok(Value::Text(characters.into_iter().collect::<String>().into()))
 }
@@ -391,6 +402,9 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
             return Err(Fault::new(codes::TEXT_TOO_LONG, columns.clone(), message)
                 .label(format!("the variable holds {length}")));
         }
+        (VariableType::Text(_), Value::Char(_) | Value::Bool(_)) => {
+            return convert(variable_type, &Value::Text(value.text().unwrap_or_default()), columns);
+        }
         (VariableType::Text(_), _) => {
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a number cannot be stored in a STRING")
                 .label("expected a text")
@@ -410,6 +424,8 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only a frame can be stored in a FRAME")
                 .label("expected a frame such as CTRANS(X, 10)"));
         }
+        (VariableType::Bool, Value::Text(text)) => Value::Bool(!text.is_empty()),
+        (VariableType::Char, Value::Char(character)) => Value::Int(*character as i32),
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
         (VariableType::Real, value) => Value::Real(value.number(columns)?),
         (VariableType::Int, value) => Value::Int(value.integer(columns)?),

@@ -116,10 +116,12 @@ codes! {
     BAD_FRAME "E0510" "A frame that is not possible";
     WORK_AREA "E0511" "A position outside the work area";
     UNKNOWN_TOOL "E0512" "A tool or an edge that the tool table does not have";
+    RAISED "E0601" "An alarm that the program itself raises (SETAL)";
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";
     CHECK_STOPPED "W0003" "The check did not run the program to its end";
     NO_TOOL_DATA "W0004" "A tool or tool edge without data: its length and radius count as 0";
     PRIORITY_TRAP "W0005" "AND, OR or XOR beside a comparison, without brackets";
     LATE_DEFINITION "W0006" "A DEF behind the first executable block";
+    RAISED_AND_SHOWN "W0007" "An alarm of the program that does not stop it (SETAL)";
 }

@@ -38,6 +38,7 @@ pub use statements::{TEXT_MAX, block_number, visit_names};
 pub use syntax::{Block, VariableType};
 pub use system_variables::{SYSTEM_VARIABLES, SystemVariable};
 pub use text::ProgramText;
+pub use visit::visit_expressions;
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 
 use std::sync::Arc;

@@ -29,7 +29,6 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
     ),
     (&["DIAMON", "DIAM90"], "diameter programming is not built yet"),
     (&["WRITE", "READ", "DELETE", "ISFILE"], "reading and writing files from the program is not built yet"),
-    (&["SETAL"], "alarms from the program are not built yet"),
     (&["MEAS", "MEAW", "MEAC"], "measuring is not built yet"),
     (&["SPN", "SPP", "SON", "PON", "SPOF"], "punching and nibbling are not built yet"),
 ];

@@ -16,6 +16,8 @@ use std::sync::Arc;
 
 /// Longest text of the control, and of a STRING without a length.
 pub const TEXT_MAX: u16 = 400;
+/// Longest name of a variable.
+const NAME_MAX: usize = 31;
 /// Dimensions of an array.
 pub(super) const DIMENSIONS_MAX: usize = 3;
 /// Jumps in one IF block.
@@ -299,6 +301,14 @@ pub(super) fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
         )
         .label("expected two letters or underscores at its start")
         .maybe_help(name.starts_with(['R', 'r']).then(|| "R parameters need no DEF".to_owned())));
+    }
+    if name.len() > NAME_MAX {
+        return Err(Fault::new(
+            codes::REDECLARED,
+            columns.clone(),
+            format!("the name of a variable has at most {NAME_MAX} characters"),
+        )
+        .label(format!("{} here", name.len())));
     }
     if name.len() == 1 || words::role(name).is_some_and(|role| !words::is_free_name(role)) {
         return Err(Fault::new(codes::REDECLARED, columns.clone(), format!("`{name}` is a word of the language"))

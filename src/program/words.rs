@@ -289,6 +289,8 @@ pub enum Procedure {
     PositionInParts,
     /// CYCLE832.
     HighSpeedSettings,
+    /// SETAL.
+    RaiseAlarm,
 }
 
 /// Words that open a statement.
@@ -371,6 +373,7 @@ pub enum Function {
     Index,
     Rindex,
     Mindex,
+    Match,
     Substr,
     Number,
     IsNumber,
@@ -399,6 +402,7 @@ impl Function {
                 | Index
                 | Rindex
                 | Mindex
+                | Match
                 | Substr
                 | Number
                 | IsNumber
@@ -413,7 +417,9 @@ impl Function {
     /// Fewest and most arguments.
     pub fn arity(self) -> (usize, usize) {
         match self {
-            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex => (2, 2),
+            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex | Self::Match => {
+                (2, 2)
+            }
             Self::Substr => (2, 3),
             Self::Bound => (3, 3),
             Self::Sprint => (1, 11),
@@ -707,6 +713,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("SPCOF", Role::Procedure(Procedure::SpindleControl)),
     ("SETMS", Role::Procedure(Procedure::MasterSpindle)),
     ("POSP", Role::Procedure(Procedure::PositionInParts)),
+    ("SETAL", Role::Procedure(Procedure::RaiseAlarm)),
     ("CYCLE832", Role::Procedure(Procedure::HighSpeedSettings)),
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
     ("CR", Role::Address(Address::Radius)),
@@ -787,6 +794,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("INDEX", Role::Function(Function::Index)),
     ("RINDEX", Role::Function(Function::Rindex)),
     ("MINDEX", Role::Function(Function::Mindex)),
+    ("MATCH", Role::Function(Function::Match)),
     ("SUBSTR", Role::Function(Function::Substr)),
     ("NUMBER", Role::Function(Function::Number)),
     ("ISNUMBER", Role::Function(Function::IsNumber)),
