@@ -4,9 +4,9 @@
 //! in `motion`, jumps and loops in `flow`.
 
 use super::active_frames::ActiveFrames;
-use super::frame::GeometryAxes;
 use super::call::{Head, ModalCall, Waiting};
 use super::flow::Repeat;
+use super::frame::GeometryAxes;
 use super::modal::Modal;
 use super::path_words::CornerWords;
 use super::placement::KnownPlace;
