@@ -372,7 +372,7 @@ fn a_block_that_leads_to_where_the_axes_stand_is_a_move() {
 fn the_first_move_opens_the_program() {
     let result = run("G0 X1");
     assert!(
-        matches!(&result.moves[0].events[..], [Event::ProgramOpened(opened)] if &*opened.name == "test.mpf" && &*opened.bytes == b"G0 X1")
+        matches!(&result.moves[0].events[..], [Event::ProgramOpened(opened)] if &*opened.name == "test.mpf" && opened.bytes == (*b"G0 X1").into())
     );
     // Also of a program that does nothing, and of one that fails at once.
     assert_eq!(run("; nothing").moves.len(), 1);

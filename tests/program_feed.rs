@@ -286,10 +286,7 @@ fn g95_and_g96_follow_the_spindle() {
     assert!(alarm(&m, "F100\nG95 M3 S100\nG1 X10\nM30\n").contains("no F"));
     // S = 100 m/min at r = 20 mm; LIMS bounds it; G97 keeps it.
     let rpm = 100_000.0 / (2.0 * PI * 20.0);
-    let found = moves(
-        &m,
-        "G0 X20\nG96 S100 M3 F0.3\nG1 Z10\nLIMS=500\nZ20\nG97\nZ30\nM30\n",
-    );
+    let found = moves(&m, "G0 X20\nG96 S100 M3 F0.3\nG1 Z10\nLIMS=500\nZ20\nG97\nZ30\nM30\n");
     let speeds: Vec<f64> = motions(&found)[1..].iter().map(|next| feeds(next)[0] / 0.3 * 60.0).collect();
     for (value, expected) in speeds.iter().zip([rpm, 500.0, 500.0]) {
         close(*value, expected);

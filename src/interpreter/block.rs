@@ -85,7 +85,7 @@ impl Interpreter {
             self.emit_function(block.last, true);
         }
         if block.ends {
-            self.end();
+            self.end()?;
         }
         Ok(())
     }
@@ -199,6 +199,7 @@ impl Interpreter {
     ) -> Outcome<()> {
         match procedure {
             Procedure::HighSpeedSettings => self.high_speed_settings(given, columns),
+            Procedure::RaiseAlarm => self.raise_alarm(given, columns),
             _ => self.feed_procedure(procedure, given, columns, block),
         }
     }
@@ -260,7 +261,6 @@ impl Interpreter {
             Keyword::SuppressFrames => block.motion.suppress(Suppression::All),
             Keyword::Frame(word) => return self.frame_word(word, columns, block),
             Keyword::StopPreparation => block.stops = true,
-            Keyword::Return => block.ends = true,
         }
         Ok(())
     }
