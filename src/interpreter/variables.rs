@@ -2,6 +2,7 @@
 //!
 //! In: definitions, assignments. Out: values. Memory is bounded. Undeclared names are findings with the nearest declared one.
 
+use super::frame::{Frame, GeometryAxes};
 use super::value::Value;
 use crate::base::diagnostics::nearest;
 use crate::program::syntax::VariableType;
@@ -22,6 +23,8 @@ pub struct Variables {
     /// GUD: known to all programs.
     global: BTreeMap<Arc<str>, Variable>,
     elements: usize,
+    /// Axes that the frames of a program turn.
+    frame_axes: GeometryAxes,
 }
 
 #[derive(Clone, Debug)]
@@ -35,6 +38,17 @@ struct Variable {
 }
 
 impl Variables {
+    /// None yet; frames of the program turn these axes.
+    pub fn new(frame_axes: GeometryAxes) -> Self {
+        Self { frame_axes, ..Self::default() }
+    }
+
+    /// Number of dimensions of a variable of type FRAME; `None`: it is none.
+    pub fn frame_dimensions(&self, name: &str) -> Option<usize> {
+        let variable = self.find(name).filter(|variable| variable.variable_type == VariableType::Frame)?;
+        Some(variable.dimensions.len())
+    }
+
     /// R parameter; 0 before the first assignment.
     pub fn parameter(&self, number: i32, columns: &Columns) -> Outcome<f64> {
         Ok(self.parameters.get(parameter_index(number, columns)?).copied().unwrap_or(0.0))
@@ -122,11 +136,7 @@ impl Variables {
             VariableType::Real => Value::Real(0.0),
             VariableType::Text(_) => Value::Text(Arc::from("")),
             VariableType::Axis => Value::Axis(None),
-            VariableType::Frame => {
-                return Err(
-                    Fault::new(codes::NOT_BUILT, columns.clone(), "FRAME: not built yet").label("not built yet")
-                );
-            }
+            VariableType::Frame => Value::Frame(Arc::new(Frame::identity(self.frame_axes))),
         };
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
@@ -286,8 +296,11 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
                 .label("expected the name of an axis")
                 .help("AXNAME makes an axis of a text"));
         }
-        // DEF refuses it.
-        (VariableType::Frame, value) => value.clone(),
+        (VariableType::Frame, Value::Frame(_)) => value.clone(),
+        (VariableType::Frame, _) => {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only a frame can be stored in a FRAME")
+                .label("expected a frame such as CTRANS(X, 10)"));
+        }
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
         (VariableType::Real, value) => Value::Real(value.number(columns)?),
         (VariableType::Int, value) => Value::Int(value.integer(columns)?),
