@@ -90,7 +90,7 @@ fn characters_of_texts() {
     let text = "DEF STRING[10] NAME=\"Fraes\"\nDEF STRING[5] LIST[2]=(\"ab\",\"cd\")\nNAME[0]=\"G\"\nNAME[1]=82\nMSG(NAME)\nMSG(\"\"<<NAME[2])\n";
     // The list of values needs SET on the control as here.
     let text = text.replace("=(\"ab\",\"cd\")", "=SET(\"ab\",\"cd\")") + "MSG(\"\"<<LIST[1,1])\n";
-    assert_eq!(messages(&text), ["GRaes", "97", "100"]);
+    assert_eq!(messages(&text), ["GRaes", "a", "d"]);
     assert_eq!(alarm("DEF STRING[4] TXT=\"ab\"\nTXT[2]=\"c\"\n"), "E0307");
 }
 
@@ -101,6 +101,29 @@ fn variables_of_axes() {
     assert_eq!(messages(text), ["YX4"]);
     assert_eq!(alarm("DEF AXIS WHICH\nR1=$P_EP[WHICH]\n"), "E0303");
     assert_eq!(alarm("DEF AXIS WHICH=5\n"), "E0303");
+}
+
+#[test]
+fn an_axis_word_may_be_computed() {
+    let text = "DEF AXIS WHICH=Y\nG0 AX[WHICH]=7 AX[X]=IC(2)\nMSG(\"\"<<$P_EP[X]<<$P_EP[Y])\n";
+    assert_eq!(messages(text), ["27"]);
+    assert_eq!(alarm("G0 AX[5]=1\n"), "E0204");
+    assert_eq!(alarm("G0 X1 AX[X]=1\n"), "E0205");
+}
+
+#[test]
+fn the_priority_of_and_is_warned_of() {
+    let warned = |text: &str| {
+        let mut interpreter = Interpreter::new(ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
+        while interpreter.next_move().expect("no alarm").is_some() {}
+        interpreter.take_warnings().iter().filter(|finding| finding.code == "W0005").count()
+    };
+    assert_eq!(warned("R1=10 R2=20\nIF R1==10 AND R2==20 GOTOF LAB\nLAB: M30\n"), 1);
+    assert_eq!(warned("R1=10 R2=20\nIF (R1==10) AND (R2==20) GOTOF LAB\nLAB: M30\n"), 0);
+    assert_eq!(warned("IF R1==(1 AND 0) GOTOF LAB\nLAB: M30\n"), 0);
+    assert_eq!(warned("IF R1+R2*2>3 GOTOF LAB\nLAB: M30\n"), 0);
+    // 10 AND 20 is TRUE, which is 1; R1 == 1 is FALSE; FALSE == 20 is FALSE.
+    assert_eq!(messages("R1=10 R2=20\nIF R1==10 AND R2==20\nMSG(\"yes\")\nELSE\nMSG(\"no\")\nENDIF\n"), ["no"]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::output::show;
 use crate::base::Diagnostic;
 use crate::interpreter::Setup;
-use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, load, unsupported};
+use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, unsupported};
 use crate::program::{ProgramSource, taken_axis_names};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -58,25 +58,74 @@ pub(super) struct Surroundings {
     /// Folder in which sub-programs are looked for, after that of the program; may be given several times
     #[arg(short = 'I', long = "include", value_name = "FOLDER")]
     include: Vec<PathBuf>,
-    /// File with definitions of global user variables (GUD); may be given several times
+    /// File with definitions of global user variables (GUD), instead of those beside the program; may be given several times
     #[arg(long = "gud", value_name = "FILE.DEF")]
     definitions: Vec<PathBuf>,
     /// Skip levels to activate, such as 0,3: blocks with / or /3 are not executed
     #[arg(long = "skip", value_name = "LEVELS", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(0..=9))]
     skip: Vec<u8>,
+    /// Tool table (docs/workshop-file.md); without one the length of every tool is 0
+    #[arg(short, long, value_name = "TOOLS.toml")]
+    tools: Option<PathBuf>,
+    /// Zero offsets (G54 and so on) of the same form; may also stand in the file of the tools
+    #[arg(short = 'z', long, value_name = "OFFSETS.toml")]
+    offsets: Option<PathBuf>,
 }
 
 impl Surroundings {
     /// Opens a program with what lies around it.
-    pub(super) fn open(&self, program: &Path) -> Result<Setup, Failure> {
+    pub(super) fn open(&self, program: &Path, machine: &Machine) -> Result<Setup, Failure> {
+        let mut definitions = self.definitions.clone();
+        if definitions.is_empty() {
+            definitions = definitions_beside(program);
+            if !definitions.is_empty() {
+                let names: Vec<_> = definitions.iter().map(|path| format!("`{}`", path.display())).collect();
+                let note = format!("global user variables are taken from {}", names.join(", "));
+                show([&Diagnostic::note("C0006", note).help("name other definition files with --gud")]);
+            }
+        }
         let open = |path: &PathBuf| ProgramSource::from_file(path).map_err(Failure::unreadable);
-        Ok(Setup {
+        let mut setup = Setup {
             directories: self.include.clone(),
-            definitions: self.definitions.iter().map(open).collect::<Result<_, _>>()?,
+            shipped: SHIPPED_PROGRAMS,
+            definitions: definitions.iter().map(open).collect::<Result<_, _>>()?,
             skip_levels: self.skip.iter().fold(0, |levels, level| levels | 1 << level),
             ..Setup::from(open_program(program)?)
-        })
+        };
+        for path in self.workshop_files() {
+            setup.add_workshop(load_workshop(path, machine).map_err(refused)?, machine);
+        }
+        Ok(setup)
     }
+
+    /// Files of tools and zero offsets.
+    pub(super) fn workshop_files(&self) -> impl Iterator<Item = &Path> {
+        self.tools.iter().chain(&self.offsets).map(PathBuf::as_path)
+    }
+}
+
+/// Definition files beside a program, as the control names them, in the order in which it reads them: SGUD.DEF, MGUD.DEF, UGUD.DEF,
+/// GUD4.DEF to GUD9.DEF, also as _N_SGUD_DEF and so on.
+fn definitions_beside(program: &Path) -> Vec<PathBuf> {
+    let folder = match program.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut found: Vec<_> =
+        entries.flatten().filter_map(|entry| Some((definition_rank(&entry.path())?, entry.path()))).collect();
+    found.sort();
+    found.into_iter().map(|(_, path)| path).collect()
+}
+
+/// Place in the order of definition files; `None` for any other file.
+fn definition_rank(path: &Path) -> Option<usize> {
+    let name = path.file_name()?.to_str()?.to_ascii_uppercase();
+    let bare = match name.strip_suffix(".DEF") {
+        Some(bare) => bare.strip_prefix("_N_").unwrap_or(bare),
+        None => name.strip_prefix("_N_")?.strip_suffix("_DEF")?,
+    };
+    ["SGUD", "MGUD", "UGUD", "GUD4", "GUD5", "GUD6", "GUD7", "GUD8", "GUD9"].iter().position(|known| *known == bare)
 }
 
 /// A machine that is not there.

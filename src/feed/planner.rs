@@ -15,7 +15,7 @@ use super::modes::ModeRules;
 use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
 use super::split::{self, Part};
-use super::{Limit, LimitKind, PlannedPiece, TimeLaw};
+use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
 use crate::interpreter::Feed;
@@ -131,9 +131,18 @@ impl Planner {
     }
 
     /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken (of a
-    /// spline, the parts before), and no other may follow. What was pushed before comes to rest at its end after
+    /// spline or a changing feed, the parts before), and no other may follow. What was pushed before comes to rest at its end after
     /// [`Planner::finish`].
     pub fn push(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
+        if !matches!(path.contour.feed, Feed::Varying { .. }) {
+            return self.push_constant(path);
+        }
+        let stretches = varying::stretches(path, self.setpoint_period_s);
+        stretches.into_iter().try_for_each(|stretch| self.push_constant(stretch))
+    }
+
+    /// A piece whose F is the same all along.
+    fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
         let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_)));
         // A length that is no number is refused as it is.
         if !polynomial || !path.length_lu().is_finite() {

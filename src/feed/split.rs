@@ -67,7 +67,7 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
 }
 
 /// Gives the first part what begins with the block and the last what ends with it.
-fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part> {
+pub(super) fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part> {
     let several = parts.len() > 1;
     if let Some(first) = parts.first_mut() {
         first.path.contour.events = whole.events.clone();
@@ -91,7 +91,7 @@ fn feed_of(rules: &AxisRules, contour: &ContourPiece) -> FeedCap {
 }
 
 /// The stretch of a piece as a piece.
-fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
+pub(super) fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
     let ContourPiece { block, kind, feed, modes, block_length_lu, .. } = &path.contour;
     let kind = match kind {
         PieceKind::Block(curve) => PieceKind::Block(curve.trimmed(from_lu, to_lu)),

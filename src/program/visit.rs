@@ -2,9 +2,10 @@
 //!
 //! In: a [`Statement`]. Out: its expressions, one after another, innermost included. Does not evaluate.
 
+use super::codes::Columns;
 use super::syntax::{
-    Case, Definition, Destination, Expr, ExprKind, IndexedValue, Initial, Jump, Statement, SystemName, Target, Word,
-    WordKind,
+    Binary, Call, Callee, Case, Definition, Destination, Expr, ExprKind, IndexedValue, Initial, Jump, Statement,
+    SystemName, Target, Word, WordKind,
 };
 use super::system_variables::SystemVariable;
 
@@ -16,9 +17,19 @@ pub fn visit_expressions(statement: &Statement, visit: &mut impl FnMut(&Expr)) {
         Statement::If(condition) | Statement::While(condition) | Statement::Until(condition) => {
             visit_expression(condition, visit);
         }
-        Statement::IfJump(condition, jump) => {
-            visit_expression(condition, visit);
-            visit_jump(jump, visit);
+        Statement::IfJump(branches) => {
+            for (condition, jump) in branches {
+                visit_expression(condition, visit);
+                visit_jump(jump, visit);
+            }
+        }
+        Statement::Call(call) => visit_call(call, visit),
+        Statement::ModalCall(Some(call)) => visit_call(call, visit),
+        Statement::CallPath(path) => path.iter().for_each(|path| visit_expression(path, visit)),
+        Statement::RepeatBlocks(repeat) => repeat.passes.iter().for_each(|passes| visit_expression(passes, visit)),
+        Statement::Return(wanted) => {
+            let given = [&wanted.target, &wanted.behind, &wanted.levels, &wanted.from_start];
+            given.into_iter().flatten().for_each(|value| visit_expression(value, visit));
         }
         Statement::For(for_loop) => {
             visit_target(&for_loop.counter, visit);
@@ -40,6 +51,29 @@ pub fn reads_main_run(statement: &Statement) -> bool {
         }
     });
     found
+}
+
+/// A comparison whose operand is an AND, OR or XOR without brackets, or a second comparison: `A == 1 AND B == 2` compares `A` with
+/// `1 AND B`. The control takes it without a word; what is marked is the whole of it.
+pub fn priority_trap(statement: &Statement) -> Option<Columns> {
+    let mut found = None;
+    visit_expressions(statement, &mut |expression| {
+        if let ExprKind::Binary(operator, operands) = &expression.kind
+            && operator.compares()
+            && [&operands.0, &operands.1].into_iter().any(bare_condition)
+        {
+            // The outermost one is met first.
+            found.get_or_insert(expression.columns.clone());
+        }
+    });
+    found
+}
+
+/// A condition without brackets of its own: with them its columns would begin before those of its first operand.
+fn bare_condition(operand: &Expr) -> bool {
+    let ExprKind::Binary(operator, operands) = &operand.kind else { return false };
+    let is_condition = operator.compares() || matches!(operator, Binary::And | Binary::Or | Binary::Xor);
+    is_condition && operand.columns.start == operands.0.columns.start
 }
 
 fn visit_word(word: &Word, visit: &mut impl FnMut(&Expr)) {
@@ -94,6 +128,13 @@ fn visit_case(case: &Case, visit: &mut impl FnMut(&Expr)) {
         visit_jump(jump, visit);
     }
     case.default.iter().for_each(|jump| visit_jump(jump, visit));
+}
+
+fn visit_call(call: &Call, visit: &mut impl FnMut(&Expr)) {
+    if let Callee::Text(name) = &call.callee {
+        visit_expression(name, visit);
+    }
+    call.arguments.iter().flatten().chain(&call.passes).for_each(|value| visit_expression(value, visit));
 }
 
 fn visit_jump(jump: &Jump, visit: &mut impl FnMut(&Expr)) {

@@ -75,8 +75,6 @@ pub enum Keyword {
     Compressor(Compressor),
     /// STOPRE.
     StopPreparation,
-    /// RET.
-    Return,
 }
 
 /// Words of the programmable frame.
@@ -242,6 +240,8 @@ pub enum Suppression {
 /// NAME[axis]=value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IndexedAddress {
+    /// AX: an axis word whose axis is computed.
+    Axis,
     /// ACC.
     Acceleration,
     /// VELOLIM.
@@ -289,6 +289,8 @@ pub enum Procedure {
     PositionInParts,
     /// CYCLE832.
     HighSpeedSettings,
+    /// SETAL.
+    RaiseAlarm,
 }
 
 /// Words that open a statement.
@@ -296,8 +298,26 @@ pub enum Procedure {
 pub enum Control {
     /// DEF.
     Define,
-    /// PROC, EXTERN: declarations, without effect until sub-programs are built.
-    Declaration,
+    /// PROC.
+    Procedure,
+    /// EXTERN.
+    External,
+    /// RET.
+    Return,
+    /// CALL.
+    Call,
+    /// PCALL.
+    PathCall,
+    /// MCALL.
+    ModalCall,
+    /// EXTCALL.
+    FileCall,
+    /// ISOCALL: refused.
+    IsoCall,
+    /// CALLPATH.
+    CallPath,
+    /// REPEATB.
+    RepeatBlock,
     /// IF.
     If,
     /// ELSE.
@@ -353,6 +373,7 @@ pub enum Function {
     Index,
     Rindex,
     Mindex,
+    Match,
     Substr,
     Number,
     IsNumber,
@@ -381,6 +402,7 @@ impl Function {
                 | Index
                 | Rindex
                 | Mindex
+                | Match
                 | Substr
                 | Number
                 | IsNumber
@@ -395,12 +417,14 @@ impl Function {
     /// Fewest and most arguments.
     pub fn arity(self) -> (usize, usize) {
         match self {
-            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex => (2, 2),
+            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex | Self::Match => {
+                (2, 2)
+            }
             Self::Substr => (2, 3),
             Self::Bound => (3, 3),
             Self::Sprint => (1, 11),
-            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (2, 16),
-            Self::Cmirror => (1, 8),
+            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (0, 16),
+            Self::Cmirror => (0, 8),
             _ => (1, 1),
         }
     }
@@ -665,6 +689,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("COMPCURV", Role::Keyword(Keyword::Compressor(Compressor::Curvature))),
     ("COMPCAD", Role::Keyword(Keyword::Compressor(Compressor::Cad))),
     ("COMPSURF", Role::Keyword(Keyword::Compressor(Compressor::Surface))),
+    ("AX", Role::Indexed(IndexedAddress::Axis)),
     ("ACC", Role::Indexed(IndexedAddress::Acceleration)),
     ("VELOLIM", Role::Indexed(IndexedAddress::Velocity)),
     ("JERKLIM", Role::Indexed(IndexedAddress::Jerk)),
@@ -688,9 +713,9 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("SPCOF", Role::Procedure(Procedure::SpindleControl)),
     ("SETMS", Role::Procedure(Procedure::MasterSpindle)),
     ("POSP", Role::Procedure(Procedure::PositionInParts)),
+    ("SETAL", Role::Procedure(Procedure::RaiseAlarm)),
     ("CYCLE832", Role::Procedure(Procedure::HighSpeedSettings)),
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
-    ("RET", Role::Keyword(Keyword::Return)),
     ("CR", Role::Address(Address::Radius)),
     ("TURN", Role::Address(Address::Turn)),
     ("ADIS", Role::Address(Address::RoundingDistance)),
@@ -719,8 +744,16 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("OVRRAP", Role::Address(Address::RapidOverride)),
     ("MSG", Role::Message),
     ("DEF", Role::Control(Control::Define)),
-    ("PROC", Role::Control(Control::Declaration)),
-    ("EXTERN", Role::Control(Control::Declaration)),
+    ("PROC", Role::Control(Control::Procedure)),
+    ("EXTERN", Role::Control(Control::External)),
+    ("RET", Role::Control(Control::Return)),
+    ("CALL", Role::Control(Control::Call)),
+    ("PCALL", Role::Control(Control::PathCall)),
+    ("MCALL", Role::Control(Control::ModalCall)),
+    ("EXTCALL", Role::Control(Control::FileCall)),
+    ("ISOCALL", Role::Control(Control::IsoCall)),
+    ("CALLPATH", Role::Control(Control::CallPath)),
+    ("REPEATB", Role::Control(Control::RepeatBlock)),
     ("IF", Role::Control(Control::If)),
     ("ELSE", Role::Control(Control::Else)),
     ("ENDIF", Role::Control(Control::EndIf)),
@@ -761,6 +794,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("INDEX", Role::Function(Function::Index)),
     ("RINDEX", Role::Function(Function::Rindex)),
     ("MINDEX", Role::Function(Function::Mindex)),
+    ("MATCH", Role::Function(Function::Match)),
     ("SUBSTR", Role::Function(Function::Substr)),
     ("NUMBER", Role::Function(Function::Number)),
     ("ISNUMBER", Role::Function(Function::IsNumber)),

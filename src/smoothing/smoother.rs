@@ -28,6 +28,8 @@ use crate::program::BlockRef;
 pub struct Smoother {
     rules: Rules,
     position: PartPoint,
+    /// Where the last move ended: a move without motion that ends elsewhere has another tool.
+    told: PartPoint,
     /// A block with RND, CHF or CHR at its end.
     waiting: Option<Waiting>,
     compression: Compression,
@@ -38,6 +40,8 @@ pub struct Smoother {
     unrounded: Unrounded,
     /// Axes that POSA has sent away: the program ends when they have arrived.
     positioned: PerAxis<bool>,
+    /// The block that did so last: what the wait at the end belongs to where nothing else is left.
+    sent_away: Option<Head>,
 }
 
 /// The motion block whose end is not decided yet.
@@ -81,18 +85,21 @@ impl Smoother {
         Self {
             rules: Rules::new(machine),
             position,
+            told: position,
             waiting: None,
             compression: Compression::default(),
             held: None,
             carried: None,
             unrounded: Unrounded::default(),
             positioned: PerAxis::splat(false),
+            sent_away: None,
         }
     }
 
     /// Takes the next move; hands over the pieces that it decides.
     pub fn push(&mut self, next: Move, out: &mut impl FnMut(ContourPiece)) {
         self.unrounded.watch(&next.events);
+        self.follow_tip(&next, out);
         let linear = self.rules.linear();
         match &next.kind {
             MoveKind::Rapid | MoveKind::Line => {
@@ -131,20 +138,31 @@ impl Smoother {
         }
     }
 
+    /// The axes stand and the tip of another tool is elsewhere: the path ends here and goes on there.
+    fn follow_tip(&mut self, next: &Move, out: &mut impl FnMut(ContourPiece)) {
+        let before = std::mem::replace(&mut self.told, next.end);
+        let stands = matches!(
+            next.kind,
+            MoveKind::Function { .. }
+                | MoveKind::Dwell { .. }
+                | MoveKind::WaitPositioned(_)
+                | MoveKind::StopPreparation
+        );
+        if stands && next.end != before {
+            self.rest(out);
+            self.position.0 += next.end.0 - before.0;
+        }
+    }
+
     /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
     pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
         self.end_stages(out);
-        let last = self.held.as_ref().map(|held| Head { events: Vec::new(), blocks_begun: 0, ..held.head.clone() });
         self.rest(out);
         let carried = self.carried.take();
-        let waits = self.positioned.as_slice().contains(&true);
-        match carried.or(last.filter(|_| waits)) {
-            Some(head) if waits => {
-                let positioned = self.positioned;
-                out(self.wait_positioned(head, positioned));
-            }
-            Some(head) => out(self.wait(head, 0.0)),
-            None => {}
+        let positioned = self.positioned;
+        match self.sent_away.take().filter(|_| positioned.as_slice().contains(&true)) {
+            Some(sent_away) => out(self.wait_positioned(carried.unwrap_or(sent_away), positioned)),
+            None => carried.into_iter().for_each(|head| out(self.wait(head, 0.0))),
         }
     }
 
@@ -154,6 +172,9 @@ impl Smoother {
             self.positioned[axis.axis] = true;
             self.position.0[axis.axis] = axis.end_lu;
         }
+        let Move { block, feed, modes, .. } = &next;
+        let (feed, modes) = (feed.clone(), modes.clone());
+        self.sent_away = Some(Head { block: *block, feed, modes, events: Vec::new(), blocks_begun: 0 });
         let programmed = next.modes.programmed.clone();
         let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
         let mut events = next.events.clone();

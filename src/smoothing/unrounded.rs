@@ -76,9 +76,8 @@ impl Unrounded {
     /// The line of a block, marked.
     pub(super) fn place(&self, block: BlockRef) -> Option<Place> {
         let program = self.programs.iter().rev().find(|program| program.id == block.program)?;
-        let line = program.bytes.split(|byte| *byte == b'\n').nth((block.line as usize).checked_sub(1)?)?;
         let source = ProgramSource::from_bytes(&program.name, program.bytes.clone());
-        let line_text = source.decode(line).trim_end().to_owned();
+        let line_text = source.text_of_line(block.line)?.trim_end().to_owned();
         let columns = 0..line_text.len();
         Some(Place { file: program.name.clone(), line: block.line, line_text, columns, label: "ends here".to_owned() })
     }
