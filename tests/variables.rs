@@ -90,7 +90,7 @@ fn characters_of_texts() {
     let text = "DEF STRING[10] NAME=\"Fraes\"\nDEF STRING[5] LIST[2]=(\"ab\",\"cd\")\nNAME[0]=\"G\"\nNAME[1]=82\nMSG(NAME)\nMSG(\"\"<<NAME[2])\n";
     // The list of values needs SET on the control as here.
     let text = text.replace("=(\"ab\",\"cd\")", "=SET(\"ab\",\"cd\")") + "MSG(\"\"<<LIST[1,1])\n";
-    assert_eq!(messages(&text), ["GRaes", "97", "100"]);
+    assert_eq!(messages(&text), ["GRaes", "a", "d"]);
     assert_eq!(alarm("DEF STRING[4] TXT=\"ab\"\nTXT[2]=\"c\"\n"), "E0307");
 }
 

@@ -5,7 +5,7 @@
 use sollwert::interpreter::{Interpreter, Listing};
 use sollwert::machine::{self, Machine};
 use sollwert::program::plain::plain_block;
-use sollwert::program::{Dialect, ProgramSource, parse, print};
+use sollwert::program::{Dialect, ProgramSource, Window, parse, print};
 use std::sync::LazyLock;
 
 /// A program may loop for ever on purpose: so many moves are enough.
@@ -23,8 +23,9 @@ pub fn text(bytes: &[u8]) {
     for machine in &*MACHINES {
         let dialect = Dialect::new(machine);
         let mut cursor = source.first();
-        while let Some((line, next)) = source.line_bytes(cursor) {
-            let _ = plain_block(line, &dialect);
+        let mut window = Window::default();
+        while let Ok(Some((line, next))) = source.line(&mut window, cursor) {
+            let _ = plain_block(&line, &dialect);
             let text = source.line_text(cursor);
             match parse(&text, &dialect) {
                 Ok(block) => {
@@ -34,7 +35,7 @@ pub fn text(bytes: &[u8]) {
                     assert_eq!(print(&again, &dialect), printed, "`{text}`");
                 }
                 Err(fault) => {
-                    let shown = fault.at("fuzz.mpf".into(), cursor.line, text.into_owned());
+                    let shown = fault.at("fuzz.mpf".into(), cursor.line, text);
                     assert!(!shown.render(false).is_empty());
                 }
             }

@@ -58,7 +58,7 @@ pub(super) struct Surroundings {
     /// Folder in which sub-programs are looked for, after that of the program; may be given several times
     #[arg(short = 'I', long = "include", value_name = "FOLDER")]
     include: Vec<PathBuf>,
-    /// File with definitions of global user variables (GUD); may be given several times
+    /// File with definitions of global user variables (GUD), instead of those beside the program; may be given several times
     #[arg(long = "gud", value_name = "FILE.DEF")]
     definitions: Vec<PathBuf>,
     /// Skip levels to activate, such as 0,3: blocks with / or /3 are not executed
@@ -75,10 +75,20 @@ pub(super) struct Surroundings {
 impl Surroundings {
     /// Opens a program with what lies around it.
     pub(super) fn open(&self, program: &Path, machine: &Machine) -> Result<Setup, Failure> {
+        let mut definitions = self.definitions.clone();
+        if definitions.is_empty() {
+            definitions = definitions_beside(program);
+            if !definitions.is_empty() {
+                let names: Vec<_> = definitions.iter().map(|path| format!("`{}`", path.display())).collect();
+                let note = format!("global user variables are taken from {}", names.join(", "));
+                show([&Diagnostic::note("C0006", note).help("name other definition files with --gud")]);
+            }
+        }
         let open = |path: &PathBuf| ProgramSource::from_file(path).map_err(Failure::unreadable);
         let mut setup = Setup {
             directories: self.include.clone(),
-            definitions: self.definitions.iter().map(open).collect::<Result<_, _>>()?,
+            shipped: SHIPPED_PROGRAMS,
+            definitions: definitions.iter().map(open).collect::<Result<_, _>>()?,
             skip_levels: self.skip.iter().fold(0, |levels, level| levels | 1 << level),
             ..Setup::from(open_program(program)?)
         };
@@ -92,6 +102,30 @@ impl Surroundings {
     pub(super) fn workshop_files(&self) -> impl Iterator<Item = &Path> {
         self.tools.iter().chain(&self.offsets).map(PathBuf::as_path)
     }
+}
+
+/// Definition files beside a program, as the control names them, in the order in which it reads them: SGUD.DEF, MGUD.DEF, UGUD.DEF,
+/// GUD4.DEF to GUD9.DEF, also as _N_SGUD_DEF and so on.
+fn definitions_beside(program: &Path) -> Vec<PathBuf> {
+    let folder = match program.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let mut found: Vec<_> =
+        entries.flatten().filter_map(|entry| Some((definition_rank(&entry.path())?, entry.path()))).collect();
+    found.sort();
+    found.into_iter().map(|(_, path)| path).collect()
+}
+
+/// Place in the order of definition files; `None` for any other file.
+fn definition_rank(path: &Path) -> Option<usize> {
+    let name = path.file_name()?.to_str()?.to_ascii_uppercase();
+    let bare = match name.strip_suffix(".DEF") {
+        Some(bare) => bare.strip_prefix("_N_").unwrap_or(bare),
+        None => name.strip_prefix("_N_")?.strip_suffix("_DEF")?,
+    };
+    ["SGUD", "MGUD", "UGUD", "GUD4", "GUD5", "GUD6", "GUD7", "GUD8", "GUD9"].iter().position(|known| *known == bare)
 }
 
 /// A machine that is not there.

@@ -14,6 +14,7 @@ pub mod profile;
 pub mod ramp;
 mod scan;
 mod split;
+mod varying;
 mod wire;
 mod worst;
 

@@ -1,8 +1,8 @@
-//! Cuts a block whose bend or feed varies into parts with a speed of their own.
+//! Cuts a block whose bend varies into parts with a speed of their own.
 //!
-//! In: a piece of path. Out: its parts in order, each with one feed and the greatest demands on it. A feed that changes (FLIN, FCUB, G96)
-//! cuts any curve. A spline or polynomial is also cut where its direction or curvature steps, and where the speed that it allows changes
-//! so much, and for so long, that changing the speed pays. Parts belong to the same block: the first has its events and its count, the last its stop.
+//! In: a piece of path. Out: its parts in order, each with the greatest demands on it: a line, arc or blend as it is, a spline or
+//! polynomial cut where its direction or curvature steps, and where the speed that it allows changes so much, and for so long, that
+//! changing the speed pays. Parts belong to the same block: the first has its events and its count, the last its stop.
 //!
 //! A change of speed ends without acceleration where a part ends, so that many short parts are slower than one. Borders are taken away
 //! until on each part that is faster than a neighbour there is room for the change.
@@ -11,8 +11,7 @@
 use super::limits::{AxisRules, FeedCap, PieceLimits};
 use super::scan::Scan;
 use super::worst::Worst;
-use crate::geometry::{Curve, DISPLACEMENT_MIN_LU};
-use crate::interpreter::Feed;
+use crate::geometry::Curve;
 use crate::kinematics::JointPath;
 use crate::smoothing::{ContourPiece, PieceKind};
 
@@ -22,17 +21,12 @@ const STEP_RATIO: f64 = 1.25;
 /// Room on a faster part as share of the way that its changes of speed take: with less, its border is taken away.
 const ROOM_RATIO: f64 = 0.7;
 
-/// Feeds of neighbouring stretches that differ by less than this factor are one, the lower.
-const FEED_RATIO: f64 = 1.01;
-
 /// A part of a block.
 #[derive(Debug)]
 pub(super) struct Part {
     pub path: JointPath,
     /// `None`: the curve has closed forms.
     pub worst: Option<Worst>,
-    /// Length of the whole; `None`: this is the whole.
-    pub block_length_lu: Option<f64>,
 }
 
 /// Stretch between two places of a scan with the lowest speed on it.
@@ -43,84 +37,22 @@ struct Stretch {
     speed_lu_s: f64,
 }
 
-/// True for what [`parts`] has something to do with: splines, polynomials, and feeds that change on the way.
-pub(super) fn asks_for_parts(contour: &ContourPiece) -> bool {
-    matches!(contour.curve(), Some(Curve::Polynomial(_))) || matches!(contour.feed, Feed::Varying { .. })
-}
-
 /// The parts of a piece, at least one.
 pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
-    let mut parts = Vec::new();
-    for ([from_lu, to_lu], feed) in feeds(&path.contour, path.length_lu()) {
-        let mut stretch = cut(&path, from_lu, to_lu);
-        stretch.contour.feed = feed;
-        curve_parts(rules, stretch, &mut parts);
-    }
-    named(parts, &path.contour, path.length_lu())
-}
-
-/// The feeds along a piece: from where to where each holds.
-fn feeds(contour: &ContourPiece, length_lu: f64) -> Vec<([f64; 2], Feed)> {
-    let Feed::Varying { feeds_lu_s } = &contour.feed else {
-        return vec![([0.0, length_lu], contour.feed.clone())];
-    };
-    let [start_ratio, end_ratio] = contour.range_ratio;
-    let count = feeds_lu_s.len() as f64;
-    let place_lu = |border: usize| {
-        let ratio = (border as f64 / count - start_ratio) / (end_ratio - start_ratio);
-        (ratio * length_lu).max(0.0).min(length_lu)
-    };
-    // Start, end, lowest and highest feed.
-    let mut stretches: Vec<([f64; 2], [f64; 2])> = Vec::new();
-    for (i, feed_lu_s) in feeds_lu_s.iter().enumerate() {
-        let (from_lu, to_lu) = (place_lu(i), place_lu(i + 1));
-        // What the ends of the piece cut off, but for a rounding error.
-        if to_lu - from_lu < DISPLACEMENT_MIN_LU {
-            continue;
-        }
-        match stretches.last_mut() {
-            Some((place, [low, high])) if feed_lu_s.max(*high) <= FEED_RATIO * feed_lu_s.min(*low) => {
-                place[1] = to_lu;
-                (*low, *high) = (low.min(*feed_lu_s), high.max(*feed_lu_s));
-            }
-            _ => stretches.push(([from_lu, to_lu], [*feed_lu_s; 2])),
-        }
-    }
-    if let Some((place, _)) = stretches.first_mut() {
-        place[0] = 0.0;
-    }
-    if let Some((place, _)) = stretches.last_mut() {
-        place[1] = length_lu;
-    }
-    // Stretches that were left out lie between two others.
-    for i in 1..stretches.len() {
-        stretches[i].0[0] = stretches[i - 1].0[1];
-    }
-    if stretches.is_empty() {
-        let lowest_lu_s = feeds_lu_s.iter().copied().fold(f64::INFINITY, f64::min);
-        stretches.push(([0.0, length_lu], [lowest_lu_s; 2]));
-    }
-    stretches.into_iter().map(|(place, [feed_lu_s, _])| (place, Feed::Path { feed_lu_s })).collect()
-}
-
-/// Cuts a piece of one feed by its curve.
-fn curve_parts(rules: &AxisRules, path: JointPath, parts: &mut Vec<Part>) {
     let curve = match &path.contour.kind {
         PieceKind::Block(Curve::Polynomial(curve)) => curve,
         PieceKind::Blend(Curve::Polynomial(_), _) => {
             let scan = scan(rules, &path);
             let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1)));
-            parts.push(Part { path, worst, block_length_lu: None });
-            return;
+            return vec![Part { path, worst }];
         }
-        _ => {
-            parts.push(Part { path, worst: None, block_length_lu: None });
-            return;
-        }
+        _ => return vec![Part { path, worst: None }],
     };
+    let length_lu = curve.length_lu();
     let mut borders = vec![0.0];
     borders.extend(curve.breaks_lu());
-    borders.push(curve.length_lu());
+    borders.push(length_lu);
+    let mut parts = Vec::new();
     for range in borders.windows(2) {
         let smooth = cut(&path, range[0], range[1]);
         let scan = scan(rules, &smooth);
@@ -128,13 +60,14 @@ fn curve_parts(rules: &AxisRules, path: JointPath, parts: &mut Vec<Part>) {
             let places = scan.places();
             let (from_lu, to_lu) = (places[stretch.first].s_lu, places[stretch.last].s_lu);
             let worst = Some(scan.worst(stretch.first, stretch.last));
-            parts.push(Part { path: cut(&smooth, from_lu, to_lu), worst, block_length_lu: None });
+            parts.push(Part { path: cut(&smooth, from_lu, to_lu), worst });
         }
     }
+    named(parts, &path.contour, length_lu)
 }
 
 /// Gives the first part what begins with the block and the last what ends with it.
-fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part> {
+pub(super) fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part> {
     let several = parts.len() > 1;
     if let Some(first) = parts.first_mut() {
         first.path.contour.events = whole.events.clone();
@@ -144,7 +77,7 @@ fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part
         last.path.contour.stop_at_end = whole.stop_at_end;
     }
     for part in parts.iter_mut().filter(|_| several) {
-        part.block_length_lu = Some(length_lu);
+        part.path.contour.block_length_lu = whole.block_length_lu.or(Some(length_lu));
     }
     parts
 }
@@ -158,8 +91,8 @@ fn feed_of(rules: &AxisRules, contour: &ContourPiece) -> FeedCap {
 }
 
 /// The stretch of a piece as a piece.
-fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
-    let ContourPiece { block, kind, feed, modes, range_ratio, .. } = &path.contour;
+pub(super) fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
+    let ContourPiece { block, kind, feed, modes, block_length_lu, .. } = &path.contour;
     let kind = match kind {
         PieceKind::Block(curve) => PieceKind::Block(curve.trimmed(from_lu, to_lu)),
         other => other.clone(),
@@ -172,7 +105,7 @@ fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
             modes: modes.clone(),
             events: Vec::new(),
             blocks_begun: 0,
-            range_ratio: *range_ratio,
+            block_length_lu: *block_length_lu,
             stop_at_end: false,
         },
     }

@@ -88,7 +88,7 @@ impl Interpreter {
             self.emit_function(block.last, true);
         }
         if block.ends {
-            self.end();
+            self.end()?;
         }
         Ok(())
     }
@@ -106,7 +106,7 @@ impl Interpreter {
         if block.motion.any() {
             self.motion(&block.motion, &mut events)?;
             if let Some(last) = self.queue.pop_back() {
-                let corner = self.corner_insert(&last.kind, &block.corner);
+                let corner = self.corner_insert(&last.kind, &block.corner, block.motion.suppression);
                 self.queue.push_back(Move { corner, ..last });
             }
         }
@@ -202,6 +202,7 @@ impl Interpreter {
     ) -> Outcome<()> {
         match procedure {
             Procedure::HighSpeedSettings => self.high_speed_settings(given, columns),
+            Procedure::RaiseAlarm => self.raise_alarm(given, columns),
             _ => self.feed_procedure(procedure, given, columns, block),
         }
     }
@@ -263,7 +264,6 @@ impl Interpreter {
             Keyword::SuppressFrames => block.motion.suppress(Suppression::All),
             Keyword::Frame(word) => return self.frame_word(word, columns, block),
             Keyword::StopPreparation => block.stops = true,
-            Keyword::Return => block.ends = true,
         }
         Ok(())
     }

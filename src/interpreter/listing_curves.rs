@@ -47,7 +47,8 @@ fn piece_text(machine: &Machine, piece: &PolynomialPiece) -> String {
     for id in machine.axis_ids() {
         let axis = machine.axis(id);
         let rotary = axis.kind == AxisKind::Rotary;
-        let own = powers(&piece.numerator_lu.each_ref().map(|row| if rotary { deg_from_rad(row[id]) } else { row[id] }));
+        let own =
+            powers(&piece.numerator_lu.each_ref().map(|row| if rotary { deg_from_rad(row[id]) } else { row[id] }));
         // An axis that stands has no word, unless it is divided.
         if denominator.len() > 1 || own.len() > 1 {
             text.push_str(&format!(" {}({})", axis.name, own.join(",")));

@@ -12,12 +12,14 @@
 //! * G70 converts positions, arcs and frames; G700 also F, CTOL and ADIS. Rotary axes are never converted.
 //! * With G91 or IC() an axis also makes good a change of frames since its last motion (SD42440 = 1, the control's default).
 //! * Absolute positions of an endless axis are taken as they are; DC, ACP and ACN choose the way round.
-//! * Skip levels (`/`) are not active: these blocks are executed.
+//! * Blocks with `/` to `/9` are executed, unless their level is among the active skip levels of the [`Setup`].
 //! * G601 is what is done; G602 and G603 are reported. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
 mod active_frames;
+mod alarm;
 mod arc;
 mod block;
+mod call;
 mod check;
 mod curve_motion;
 mod curve_state;
@@ -32,6 +34,7 @@ mod frame;
 mod frame_variables;
 mod frame_words;
 mod g_groups;
+mod jump;
 mod listing;
 mod listing_curves;
 mod modal;
@@ -45,6 +48,7 @@ mod setup;
 pub mod spline;
 mod spline_blocks;
 mod strings;
+mod system_constants;
 mod system_values;
 mod tool_variables;
 mod tool_words;

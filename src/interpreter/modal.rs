@@ -110,6 +110,19 @@ impl Modal {
         }
     }
 
+    /// SAVE: G functions and frames of `saved` hold again; feed, spindle, tool and the other addresses stay.
+    pub fn restore(&mut self, saved: Self) {
+        let now = std::mem::replace(self, saved);
+        self.feed = now.feed;
+        self.spindle_speed_rpm = now.spindle_speed_rpm;
+        self.tool = now.tool;
+        self.programmed = now.programmed;
+        self.contour_tolerance_mm = now.contour_tolerance_mm;
+        self.rounding_distance_mm = now.rounding_distance_mm;
+        self.rapid_rounding_distance_mm = now.rapid_rounding_distance_mm;
+        self.corner = now.corner;
+    }
+
     /// Modes for the wire; `exact_stop` = G9 in this block.
     pub fn modes(&self, exact_stop: bool) -> Modes {
         let rapid = self.motion == Motion::Rapid;

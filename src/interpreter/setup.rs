@@ -7,7 +7,7 @@ use super::frame::{Frame, GeometryAxes};
 use super::zero_offsets::ZeroOffsets;
 use crate::base::{AxisId, AxisKind};
 use crate::machine::{Machine, ToolTable, Workshop};
-use crate::program::ProgramSource;
+use crate::program::{ProgramSource, Shipped};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,6 +18,8 @@ pub struct Setup {
     pub program: ProgramSource,
     /// Folders in which sub-programs are looked for after that of the main program, in order.
     pub directories: Vec<PathBuf>,
+    /// Programs inside the binary: searched last.
+    pub shipped: Shipped,
     /// Definition files (GUD), executed before the program.
     pub definitions: Vec<ProgramSource>,
     /// Tool table; `None`: every tool has length 0.
@@ -36,6 +38,7 @@ impl From<ProgramSource> for Setup {
         Self {
             program,
             directories: Vec::new(),
+            shipped: &[],
             definitions: Vec::new(),
             skip_levels: 0,
             lists_only: false,

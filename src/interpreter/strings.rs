@@ -62,6 +62,7 @@ pub(super) fn text_function(
         Function::StrLen => call.text(0).map(|text| Value::Int(length(&text))),
         Function::Index => call.find(|characters, wanted| characters.iter().position(|c| wanted.starts_with(*c))),
         Function::Rindex => call.find(|characters, wanted| characters.iter().rposition(|c| wanted.starts_with(*c))),
+        Function::Match => call.place_of_text(),
         Function::Mindex => call.find(|characters, wanted| characters.iter().position(|c| wanted.contains(*c))),
         Function::Substr => call.part(),
         Function::Number => call.number_of_text(),
@@ -99,6 +100,7 @@ impl TextCall<'_> {
     fn text(&self, place: usize) -> Outcome<Arc<str>> {
         match self.value(place)? {
             Value::Text(text) => Ok(text),
+            Value::Char(character) => Ok(character.to_string().into()),
             Value::Int(code) if is_character(&self.arguments[place], code) => {
                 Ok(char::from_u32(code.unsigned_abs()).unwrap_or(' ').to_string().into())
             }
@@ -120,6 +122,13 @@ impl TextCall<'_> {
         let characters: Vec<char> = self.text(0)?.chars().collect();
         let found = search(&characters, &self.text(1)?);
         Ok(Value::Int(found.map_or(NOWHERE, |place| place as i32)))
+    }
+
+    /// MATCH(text, wanted): where the whole of `wanted` stands.
+    fn place_of_text(&self) -> Outcome<Value> {
+        let (text, wanted) = (self.text(0)?, self.text(1)?);
+        let place = text.find(&*wanted).map(|at| length(&text[..at]));
+        Ok(Value::Int(place.unwrap_or(NOWHERE)))
     }
 
     /// SUBSTR(text, from) or SUBSTR(text, from, count).

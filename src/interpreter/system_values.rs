@@ -17,7 +17,7 @@ use crate::base::{AxisId, AxisKind};
 use crate::machine::DriveData;
 use crate::program::syntax::{Expr, SystemName};
 use crate::program::{Columns, Fault, Outcome, SYSTEM_VARIABLES, SystemVariable, codes};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Elements of $AC_MARKER, $AC_PARAM, $AC_TIMER, $A_OUT and so on.
 const ELEMENTS_MAX: i32 = 1000;
@@ -30,6 +30,27 @@ pub(super) struct ChannelMemory {
     outputs: BTreeMap<(bool, i32), bool>,
     /// Value written, and the time of the main run then; a stopped clock has no time.
     timers: BTreeMap<i32, (f64, Option<f64>)>,
+    /// PLC data and counters, by name and index.
+    kept: BTreeMap<(&'static str, i32), f64>,
+    /// Alarms of SETAL that have been shown.
+    shown_alarms: BTreeSet<i32>,
+}
+
+impl ChannelMemory {
+    /// What was written last; 0 before.
+    pub(super) fn kept(&self, name: &'static str, element: i32) -> f64 {
+        self.kept.get(&(name, element)).copied().unwrap_or(0.0)
+    }
+
+    /// Keeps a value.
+    pub(super) fn keep(&mut self, name: &'static str, element: i32, value: f64) {
+        self.kept.insert((name, element), value);
+    }
+
+    /// True the first time that this alarm is to be shown.
+    pub(super) fn first_shown(&mut self, number: i32) -> bool {
+        self.shown_alarms.insert(number)
+    }
 }
 
 impl Interpreter {
@@ -75,7 +96,10 @@ impl Interpreter {
                 let output = &**name == "$A_OUT";
                 Value::Bool(self.memory.outputs.get(&(output, element()?)).copied().unwrap_or(false))
             }
-            _ => return Err(self.unknown_system_variable(name, columns)),
+            _ => match self.constant_variable(system, columns)? {
+                Some(value) => value,
+                None => return Err(self.unknown_system_variable(name, columns)),
+            },
         })
     }
 
@@ -106,8 +130,12 @@ impl Interpreter {
             }
             Some(_) => {}
         }
+        self.report_plc(name, name_columns);
         if &**name == "$AN_SLTRACE" {
             return self.set_trace(value, value_columns);
+        }
+        if let Some(done) = self.keep_variable(system, value, name_columns, value_columns) {
+            return done;
         }
         let element = self.element(name, indices, name_columns)?;
         match &**name {
@@ -163,7 +191,7 @@ impl Interpreter {
     }
 
     /// The index that is an axis.
-    fn index_axis(&self, indices: &[Expr], columns: &Columns) -> Outcome<AxisId> {
+    pub(super) fn index_axis(&self, indices: &[Expr], columns: &Columns) -> Outcome<AxisId> {
         match indices {
             [one] => self.axis_of(one),
             // $MA_MAX_AX_ACCEL[0, X]: the element of the axis' datum comes first.
@@ -174,7 +202,7 @@ impl Interpreter {
     }
 
     /// The one index that is a number.
-    fn element(&self, name: &str, indices: &[Expr], columns: &Columns) -> Outcome<i32> {
+    pub(super) fn element(&self, name: &str, indices: &[Expr], columns: &Columns) -> Outcome<i32> {
         match integers(indices, self)?.as_slice() {
             [element] if (0..ELEMENTS_MAX).contains(element) => Ok(*element),
             [element] => Err(Fault::new(codes::BAD_INDEX, columns.clone(), format!("there is no {name}[{element}]"))
@@ -187,6 +215,9 @@ impl Interpreter {
     /// $MA_, $MC_, $MN_, $SC_: what the machine file says, in the units of the control.
     fn machine_datum(&self, system: &SystemName, columns: &Columns) -> Outcome<Value> {
         let SystemName { name, indices } = system;
+        if let Some(value) = self.fixed_machine_datum(system, columns)? {
+            return Ok(value);
+        }
         let machine = &self.machine;
         match &**name {
             "$MC_CURV_EFFECT_ON_PATH_ACCEL" => return Ok(Value::Real(machine.smoothing.radial_acceleration_share)),
@@ -243,6 +274,18 @@ impl Interpreter {
     }
 
     pub(super) fn unknown_system_variable(&self, name: &str, columns: &Columns) -> Box<Fault> {
+        let is_datum = ["$MA_", "$MC_", "$MN_", "$SA_", "$SC_", "$SN_"].iter().any(|prefix| name.starts_with(prefix));
+        if is_datum && SystemVariable::find(name).is_none() {
+            let message = format!("the machine file has no datum for `{name}`");
+            let near = nearest(name, SYSTEM_VARIABLES.iter().map(|variable| variable.name));
+            let help = near.map_or_else(
+                || "docs/system-variables.md lists the data that it has".to_owned(),
+                |near| format!("did you mean `{near}`?"),
+            );
+            return Fault::new(codes::UNKNOWN_SYSTEM_VARIABLE, columns.clone(), message)
+                .label("no such datum")
+                .help(help);
+        }
         let near = nearest(name, SYSTEM_VARIABLES.iter().map(|variable| variable.name));
         let help = near.map(|near| format!("did you mean `{near}`?"));
         Fault::new(

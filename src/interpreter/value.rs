@@ -1,7 +1,8 @@
 //! Values of expressions and what they are converted to.
 //!
 //! In: values. Out: [`Value`], conversions with a finding where there is none. REAL to INT rounds half away from zero (the
-//! control's rule for assignments: a fraction of 0.5 or more is rounded up). Comparison of REAL is relative (1e-12).
+//! control's rule for assignments: a fraction of 0.5 or more is rounded up). Comparison of REAL is relative (1e-12). A CHAR is a number
+//! where numbers are needed and a text of one character where texts are.
 
 use super::frame::Frame;
 use crate::base::AxisId;
@@ -17,8 +18,10 @@ const EQUAL_RATIO: f64 = 1e-12;
 pub enum Value {
     /// BOOL.
     Bool(bool),
-    /// INT (and CHAR).
+    /// INT.
     Int(i32),
+    /// CHAR; the character 0 ends a text.
+    Char(char),
     /// REAL.
     Real(f64),
     /// STRING.
@@ -35,6 +38,7 @@ impl Value {
         match self {
             Self::Bool(value) => Ok(f64::from(u8::from(*value))),
             Self::Int(value) => Ok(f64::from(*value)),
+            Self::Char(character) => Ok(f64::from(u32::from(*character))),
             Self::Real(value) => Ok(*value),
             Self::Text(_) => {
                 Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a text stands where a number is needed")
@@ -74,15 +78,18 @@ impl Value {
             Self::Text(text) => Some(text.clone()),
             Self::Bool(value) => Some(Arc::from(if *value { "1" } else { "0" })),
             Self::Int(value) => Some(value.to_string().into()),
+            Self::Char('\0') => Some("".into()),
+            Self::Char(character) => Some(character.to_string().into()),
             Self::Real(value) => Some(trimmed(*value).into()),
             Self::Axis(_) | Self::Frame(_) => None,
         }
     }
 
-    /// Order of two values; texts compare with texts only.
+    /// Order of two values; texts compare with texts and characters only.
     pub fn compare(&self, other: &Self, columns: &Columns) -> Outcome<Ordering> {
         match (self, other) {
             (Self::Text(a), Self::Text(b)) => Ok(a.cmp(b)),
+            (Self::Text(_), Self::Char(_)) | (Self::Char(_), Self::Text(_)) => Ok(self.text().cmp(&other.text())),
             (Self::Int(a), Self::Int(b)) => Ok(a.cmp(b)),
             (Self::Axis(a), Self::Axis(b)) => Ok(a.cmp(b)),
             // Frames are equal or not; there is no order.

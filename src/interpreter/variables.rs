@@ -19,12 +19,84 @@ const ELEMENTS_MAX: usize = 100_000;
 #[derive(Clone, Debug, Default)]
 pub struct Variables {
     parameters: Vec<f64>,
+    /// Those of the program in execution.
     declared: BTreeMap<Arc<str>, Variable>,
+    /// Those of the programs that wait for its end, outermost first: out of its sight (MD11120 = 0).
+    waiting: Vec<BTreeMap<Arc<str>, Variable>>,
     /// GUD: known to all programs.
     global: BTreeMap<Arc<str>, Variable>,
     elements: usize,
     /// Axes that the frames of a program turn.
     frame_axes: GeometryAxes,
+}
+
+/// A whole variable, outside of [`Variables`].
+#[derive(Clone, Debug)]
+pub struct Whole(Variable);
+
+impl Whole {
+    /// A single value, converted to its type; `line` is where it is declared.
+    pub fn of(variable_type: VariableType, value: &Value, line: u32, columns: &Columns) -> Outcome<Self> {
+        let value = convert(variable_type, value, columns)?;
+        Ok(Self(Variable { variable_type, line, dimensions: Vec::new(), values: vec![value] }))
+    }
+
+    /// All values the same; `line` is where it is declared.
+    pub fn filled(
+        variable_type: VariableType,
+        sizes: &[i32],
+        value: &Value,
+        line: u32,
+        columns: &Columns,
+    ) -> Outcome<Self> {
+        let Self(mut variable) = Self::of(variable_type, value, line, columns)?;
+        let sizes: Vec<usize> = sizes.iter().map(|size| usize::try_from(*size).unwrap_or(0).max(1)).collect();
+        let count = sizes.iter().fold(1_usize, |count, size| count.saturating_mul(*size));
+        if count > ELEMENTS_MAX {
+            return Err(Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), format!("an array of {count} elements"))
+                .label(format!("at most {ELEMENTS_MAX}")));
+        }
+        variable.values.resize(count, variable.values[0].clone());
+        variable.dimensions = sizes;
+        Ok(Self(variable))
+    }
+
+    /// The same as a parameter of that type, declared in `line`: every value is converted.
+    pub fn converted(mut self, variable_type: VariableType, line: u32, columns: &Columns) -> Outcome<Self> {
+        for value in &mut self.0.values {
+            *value = convert(variable_type, value, columns)?;
+        }
+        self.0.variable_type = variable_type;
+        self.0.line = line;
+        Ok(self)
+    }
+
+    /// Its type.
+    pub fn variable_type(&self) -> VariableType {
+        self.0.variable_type
+    }
+
+    /// Sizes of its dimensions; empty for a single value.
+    pub fn dimensions(&self) -> &[usize] {
+        &self.0.dimensions
+    }
+
+    /// The value of a single one.
+    pub fn single(&self) -> Option<&Value> {
+        self.0.values.first().filter(|_| self.0.dimensions.is_empty())
+    }
+}
+
+/// Value before the first assignment.
+fn zero(variable_type: VariableType, frame_axes: GeometryAxes) -> Value {
+    match variable_type {
+        VariableType::Bool => Value::Bool(false),
+        VariableType::Char | VariableType::Int => Value::Int(0),
+        VariableType::Real => Value::Real(0.0),
+        VariableType::Text(_) => Value::Text(Arc::from("")),
+        VariableType::Axis => Value::Axis(None),
+        VariableType::Frame => Value::Frame(Arc::new(Frame::identity(frame_axes))),
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -43,10 +115,26 @@ impl Variables {
         Self { frame_axes, ..Self::default() }
     }
 
+    /// What a variable holds before the first assignment.
+    pub fn zero(&self, variable_type: VariableType) -> Value {
+        zero(variable_type, self.frame_axes)
+    }
+
     /// Number of dimensions of a variable of type FRAME; `None`: it is none.
     pub fn frame_dimensions(&self, name: &str) -> Option<usize> {
         let variable = self.find(name).filter(|variable| variable.variable_type == VariableType::Frame)?;
         Some(variable.dimensions.len())
+    }
+
+    /// A sub-program begins: it sees R parameters and none of the variables of its caller.
+    pub fn enter(&mut self) {
+        self.waiting.push(std::mem::take(&mut self.declared));
+    }
+
+    /// It ends: its variables are gone.
+    pub fn leave(&mut self) {
+        let gone = std::mem::replace(&mut self.declared, self.waiting.pop().unwrap_or_default());
+        self.elements -= gone.values().map(|variable| variable.values.len()).sum::<usize>();
     }
 
     /// R parameter; 0 before the first assignment.
@@ -130,16 +218,37 @@ impl Variables {
             .label(format!("at most {ELEMENTS_MAX}")));
         }
         self.elements = elements;
-        let zero = match variable_type {
-            VariableType::Bool => Value::Bool(false),
-            VariableType::Char | VariableType::Int => Value::Int(0),
-            VariableType::Real => Value::Real(0.0),
-            VariableType::Text(_) => Value::Text(Arc::from("")),
-            VariableType::Axis => Value::Axis(None),
-            VariableType::Frame => Value::Frame(Arc::new(Frame::identity(self.frame_axes))),
-        };
+        let zero = self.zero(variable_type);
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
+        Ok(())
+    }
+
+    /// A whole variable, to be handed to a sub-program.
+    pub fn whole(&self, name: &str, columns: &Columns) -> Outcome<Whole> {
+        self.declared(name, columns).map(|variable| Whole(variable.clone()))
+    }
+
+    /// A whole variable as a sub-program left it: stored in one of the same size.
+    pub fn set_whole(&mut self, name: &str, whole: Whole) {
+        if let Some(variable) = self.find_mut(name)
+            && variable.values.len() == whole.0.values.len()
+        {
+            variable.values = whole.0.values;
+        }
+    }
+
+    /// A parameter of a sub-program.
+    pub fn define_parameter(&mut self, name: &Arc<str>, whole: Whole, columns: &Columns) -> Outcome<()> {
+        let elements = self.elements.saturating_add(whole.0.values.len());
+        if elements > ELEMENTS_MAX {
+            let message = format!("all variables together would have {elements} elements");
+            return Err(
+                Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), message).label(format!("at most {ELEMENTS_MAX}"))
+            );
+        }
+        self.elements = elements;
+        self.declared.insert(name.clone(), whole.0);
         Ok(())
     }
 
@@ -151,7 +260,10 @@ impl Variables {
             return character(&variable.values[place], at, columns);
         }
         let place = variable.place(name, indices, columns)?;
-        Ok(variable.values[place].clone())
+        Ok(match (variable.variable_type, &variable.values[place]) {
+            (VariableType::Char, Value::Int(code)) => Value::Char(character_of(*code)),
+            (_, value) => value.clone(),
+        })
     }
 
     /// Sets a variable or array element, converted to its type.
@@ -212,19 +324,27 @@ pub fn undeclared(name: &str, near: Option<&str>, columns: &Columns) -> Box<Faul
 
 /// Character `at` of a text, as CHAR.
 fn character(text: &Value, at: i32, columns: &Columns) -> Outcome<Value> {
-    let Value::Text(text) = text else { return Ok(Value::Int(0)) };
+    let Value::Text(text) = text else { return Ok(Value::Char('\0')) };
     let found = usize::try_from(at).ok().and_then(|at| text.chars().nth(at));
-    found.map(|found| Value::Int(found as i32)).ok_or_else(|| no_character(text, at, columns))
+    found.map(Value::Char).ok_or_else(|| no_character(text, at, columns))
 }
 
-/// The text with another character `at`; just behind its end it grows.
+/// The character of a code.
+fn character_of(code: i32) -> char {
+    u32::try_from(code).ok().and_then(char::from_u32).unwrap_or('\0')
+}
+
+/// The text with another character `at`; the character 0 ends it there.
 fn with_character(text: &Value, at: i32, code: &Value, columns: &Columns) -> Outcome<Value> {
     let (Value::Text(text), Value::Int(code)) = (text, code) else { return Ok(text.clone()) };
     let mut characters: Vec<char> = text.chars().collect();
-    let new = u32::try_from(*code).ok().and_then(char::from_u32).unwrap_or(' ');
-    match usize::try_from(at).ok().and_then(|at| characters.get_mut(at)) {
-        Some(old) => *old = new,
-        None => return Err(no_character(text, at, columns)),
+    let new = character_of(*code);
+    let Some(at) = usize::try_from(at).ok().filter(|at| *at < characters.len()) else {
+        return Err(no_character(text, at, columns));
+    };
+    characters[at] = new;
+    if new == '\0' {
+        characters.truncate(at);
     }
     Ok(Value::Text(characters.into_iter().collect::<String>().into()))
 }
@@ -282,6 +402,9 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
             return Err(Fault::new(codes::TEXT_TOO_LONG, columns.clone(), message)
                 .label(format!("the variable holds {length}")));
         }
+        (VariableType::Text(_), Value::Char(_) | Value::Bool(_)) => {
+            return convert(variable_type, &Value::Text(value.text().unwrap_or_default()), columns);
+        }
         (VariableType::Text(_), _) => {
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a number cannot be stored in a STRING")
                 .label("expected a text")
@@ -301,6 +424,8 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
             return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only a frame can be stored in a FRAME")
                 .label("expected a frame such as CTRANS(X, 10)"));
         }
+        (VariableType::Bool, Value::Text(text)) => Value::Bool(!text.is_empty()),
+        (VariableType::Char, Value::Char(character)) => Value::Int(*character as i32),
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
         (VariableType::Real, value) => Value::Real(value.number(columns)?),
         (VariableType::Int, value) => Value::Int(value.integer(columns)?),

@@ -74,6 +74,7 @@ macro_rules! codes {
 
 codes! {
     UNREADABLE "E0001" "The program file cannot be read";
+    LOST "E0002" "The program file changed or went away while it was read";
     BAD_CHARACTER "E0101" "A character that has no meaning here";
     BAD_NUMBER "E0102" "A number that cannot be read";
     OPEN_STRING "E0103" "A string without its closing quote";
@@ -86,7 +87,7 @@ codes! {
     UNKNOWN_G "E0203" "A G function that does not exist";
     UNKNOWN_AXIS "E0204" "An axis that the machine does not have";
     TWICE "E0205" "An address or a G group programmed twice in one block";
-    NO_SUBPROGRAMS "E0206" "A call of a sub-program";
+    NO_SUBPROGRAMS "E0206" "A call of a sub-program that is not found";
     BAD_BLOCK "E0207" "Words that cannot stand in one block";
     UNDECLARED "E0301" "A variable without DEF";
     REDECLARED "E0302" "A variable defined twice, or with a reserved name";
@@ -101,6 +102,8 @@ codes! {
     NO_TARGET "E0401" "A jump to a label or block number that is not there";
     UNBALANCED "E0402" "IF, FOR, WHILE, LOOP or REPEAT without its end, or the other way round";
     ENDLESS "E0403" "A loop without motion that does not end";
+    CALL_DEPTH "E0404" "Sub-programs or repeated parts inside one another, too many levels deep";
+    BAD_ARGUMENT "E0405" "The values of a call do not fit the parameters of the sub-program";
     NO_FEED "E0501" "A feed motion without F";
     BAD_FEED "E0502" "A feed of zero or below";
     ARC_WITHOUT_CENTRE "E0503" "G2 or G3 without centre and without radius";
@@ -114,10 +117,12 @@ codes! {
     WORK_AREA "E0511" "A position outside the work area";
     UNKNOWN_TOOL "E0512" "A tool or an edge that the tool table does not have";
     BAD_CURVE "E0513" "A curve that these words do not make";
+    RAISED "E0601" "An alarm that the program itself raises (SETAL)";
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";
     CHECK_STOPPED "W0003" "The check did not run the program to its end";
     NO_TOOL_DATA "W0004" "A tool or tool edge without data: its length and radius count as 0";
     PRIORITY_TRAP "W0005" "AND, OR or XOR beside a comparison, without brackets";
     LATE_DEFINITION "W0006" "A DEF behind the first executable block";
+    RAISED_AND_SHOWN "W0007" "An alarm of the program that does not stop it (SETAL)";
 }

@@ -27,10 +27,8 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
         ],
         "kinematic transformations are not built yet: without them the axes would not go where the program says",
     ),
-    (&["CALL", "PCALL", "ISOCALL", "REPEATB"], "sub-programs and block repetition are not built yet"),
     (&["DIAMON", "DIAM90"], "diameter programming is not built yet"),
     (&["WRITE", "READ", "DELETE", "ISFILE"], "reading and writing files from the program is not built yet"),
-    (&["SETAL"], "alarms from the program are not built yet"),
     (&["MEAS", "MEAW", "MEAC"], "measuring is not built yet"),
     (&["SPN", "SPP", "SON", "PON", "SPOF"], "punching and nibbling are not built yet"),
 ];

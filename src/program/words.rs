@@ -75,8 +75,6 @@ pub enum Keyword {
     Compressor(Compressor),
     /// STOPRE.
     StopPreparation,
-    /// RET.
-    Return,
 }
 
 /// Words of the programmable frame.
@@ -291,6 +289,8 @@ pub enum Procedure {
     PositionInParts,
     /// CYCLE832.
     HighSpeedSettings,
+    /// SETAL.
+    RaiseAlarm,
 }
 
 /// Words that open a statement.
@@ -298,8 +298,26 @@ pub enum Procedure {
 pub enum Control {
     /// DEF.
     Define,
-    /// PROC, EXTERN: declarations, without effect until sub-programs are built.
-    Declaration,
+    /// PROC.
+    Procedure,
+    /// EXTERN.
+    External,
+    /// RET.
+    Return,
+    /// CALL.
+    Call,
+    /// PCALL.
+    PathCall,
+    /// MCALL.
+    ModalCall,
+    /// EXTCALL.
+    FileCall,
+    /// ISOCALL: refused.
+    IsoCall,
+    /// CALLPATH.
+    CallPath,
+    /// REPEATB.
+    RepeatBlock,
     /// IF.
     If,
     /// ELSE.
@@ -355,6 +373,7 @@ pub enum Function {
     Index,
     Rindex,
     Mindex,
+    Match,
     Substr,
     Number,
     IsNumber,
@@ -383,6 +402,7 @@ impl Function {
                 | Index
                 | Rindex
                 | Mindex
+                | Match
                 | Substr
                 | Number
                 | IsNumber
@@ -397,7 +417,9 @@ impl Function {
     /// Fewest and most arguments.
     pub fn arity(self) -> (usize, usize) {
         match self {
-            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex => (2, 2),
+            Self::Atan2 | Self::MinVal | Self::MaxVal | Self::Index | Self::Rindex | Self::Mindex | Self::Match => {
+                (2, 2)
+            }
             Self::Substr => (2, 3),
             Self::Bound => (3, 3),
             Self::Sprint => (1, 11),
@@ -691,9 +713,9 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("SPCOF", Role::Procedure(Procedure::SpindleControl)),
     ("SETMS", Role::Procedure(Procedure::MasterSpindle)),
     ("POSP", Role::Procedure(Procedure::PositionInParts)),
+    ("SETAL", Role::Procedure(Procedure::RaiseAlarm)),
     ("CYCLE832", Role::Procedure(Procedure::HighSpeedSettings)),
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
-    ("RET", Role::Keyword(Keyword::Return)),
     ("CR", Role::Address(Address::Radius)),
     ("TURN", Role::Address(Address::Turn)),
     ("ADIS", Role::Address(Address::RoundingDistance)),
@@ -722,8 +744,16 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("OVRRAP", Role::Address(Address::RapidOverride)),
     ("MSG", Role::Message),
     ("DEF", Role::Control(Control::Define)),
-    ("PROC", Role::Control(Control::Declaration)),
-    ("EXTERN", Role::Control(Control::Declaration)),
+    ("PROC", Role::Control(Control::Procedure)),
+    ("EXTERN", Role::Control(Control::External)),
+    ("RET", Role::Control(Control::Return)),
+    ("CALL", Role::Control(Control::Call)),
+    ("PCALL", Role::Control(Control::PathCall)),
+    ("MCALL", Role::Control(Control::ModalCall)),
+    ("EXTCALL", Role::Control(Control::FileCall)),
+    ("ISOCALL", Role::Control(Control::IsoCall)),
+    ("CALLPATH", Role::Control(Control::CallPath)),
+    ("REPEATB", Role::Control(Control::RepeatBlock)),
     ("IF", Role::Control(Control::If)),
     ("ELSE", Role::Control(Control::Else)),
     ("ENDIF", Role::Control(Control::EndIf)),
@@ -764,6 +794,7 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("INDEX", Role::Function(Function::Index)),
     ("RINDEX", Role::Function(Function::Rindex)),
     ("MINDEX", Role::Function(Function::Mindex)),
+    ("MATCH", Role::Function(Function::Match)),
     ("SUBSTR", Role::Function(Function::Substr)),
     ("NUMBER", Role::Function(Function::Number)),
     ("ISNUMBER", Role::Function(Function::IsNumber)),

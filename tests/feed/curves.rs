@@ -3,7 +3,7 @@
 use crate::support::{Program, Random, point, sample, spinner, total_s, with_rotary};
 use sollwert::base::{AxisVector, PartPoint, PerAxis};
 use sollwert::geometry::Curve;
-use sollwert::interpreter::{Feed, MoveKind, PolynomialGeometry, PolynomialPiece, SpatialArcGeometry};
+use sollwert::interpreter::{MoveKind, PolynomialGeometry, PolynomialPiece, SpatialArcGeometry};
 use sollwert::machine::{AccelerationMode, Machine, PathMode};
 use std::sync::Arc;
 
@@ -183,30 +183,4 @@ fn a_tight_place_holds_only_what_is_near() {
     let time_s: f64 = block.iter().map(|piece| piece.law.duration_s()).sum();
     let length: f64 = block.iter().map(|piece| piece.path.length_lu()).sum();
     assert!(time_s < 0.75 * length / low, "{time_s} s, {} s at the lowest speed", length / low);
-}
-
-/// A feed that changes on the way (FLIN, FCUB, G96) holds on each of its stretches of equal length, also where blends take the ends.
-#[test]
-fn a_changing_feed_holds_on_its_stretches() {
-    let machine = spinner();
-    let feeds_lu_s: Arc<[f64]> = Arc::new([20.0, 20.1, 40.0, 60.0, 10.0]);
-    let mut program = Program::new(PathMode::G642, 6000.0);
-    program.line(&[100.0, 0.0]);
-    program.feed = Feed::Varying { feeds_lu_s: feeds_lu_s.clone() };
-    program.line(&[100.0, 100.0]);
-    program.feed = Feed::Path { feed_lu_s: 100.0 };
-    program.line(&[0.0, 100.0]);
-    let planned = program.planned(&machine);
-    let block: Vec<_> = planned.iter().filter(|piece| piece.path.contour.block.line == 2).collect();
-    // 20 and 20.1 are one; then the blend behind the block.
-    assert_eq!(block.len(), 5);
-    assert_eq!(block.iter().map(|piece| piece.path.contour.blocks_begun).sum::<u32>(), 1);
-    for setpoint in sample(&machine, planned) {
-        let y = setpoint.axes[sollwert::base::AxisId::new(1)].position_lu;
-        let on_block = (setpoint.axes[sollwert::base::AxisId::new(0)].position_lu - 100.0).abs() < 1e-12;
-        if on_block && y > 0.0 && y < 100.0 {
-            let feed_lu_s = feeds_lu_s[(y / 20.0 - 1e-9) as usize];
-            assert!(setpoint.path.feed_lu_s <= feed_lu_s * (1.0 + 1e-9), "at {y}: {}", setpoint.path.feed_lu_s);
-        }
-    }
 }
