@@ -450,7 +450,7 @@ fn words_that_would_change_the_motion_are_errors() {
         "A3=0 B3=0 C3=1",
         "CIP X1 Y1 I1=2 J1=2",
         "G95",
-        "ROT Z30",
+        "TOFRAME",
         "BSPLINE X1",
         "G33 Z1 K1",
         "DEF FRAME FF",

@@ -259,7 +259,7 @@ impl Interpreter {
                 }
                 Some(argument) if parameter.dimensions.is_empty() => {
                     let value = evaluate(argument, self)?;
-                    Whole::of(parameter.variable_type, Some(&value), head.line, &argument.columns)?
+                    Whole::of(parameter.variable_type, &value, head.line, &argument.columns)?
                 }
                 Some(argument) => {
                     let whole = self.array(argument, parameter)?;
@@ -273,8 +273,8 @@ impl Interpreter {
 
     fn default_of(&mut self, parameter: &Parameter, line: u32, columns: &Columns) -> Outcome<Whole> {
         let value = match &parameter.default {
-            Some(value) => Some(evaluate(value, self)?),
-            None => None,
+            Some(value) => evaluate(value, self)?,
+            None => self.variables.initial(parameter.variable_type),
         };
         let mut sizes = Vec::new();
         for size in &parameter.dimensions {
@@ -283,7 +283,7 @@ impl Interpreter {
                 None => 1,
             });
         }
-        Whole::filled(parameter.variable_type, &sizes, value.as_ref(), line, columns)
+        Whole::filled(parameter.variable_type, &sizes, &value, line, columns)
     }
 
     /// The variable behind a VAR parameter, and what is in it.
@@ -293,7 +293,7 @@ impl Interpreter {
             ExprKind::Parameter(index) => {
                 let number = evaluate(index, self)?.integer(&index.columns)?;
                 let value = Value::Real(self.variables.parameter(number, &argument.columns)?);
-                let whole = Whole::of(VariableType::Real, Some(&value), 0, &argument.columns)?;
+                let whole = Whole::of(VariableType::Real, &value, 0, &argument.columns)?;
                 (Target::Parameter(constant(number)), whole)
             }
             ExprKind::Variable { name, indices } => {
@@ -303,7 +303,7 @@ impl Interpreter {
                     whole
                 } else {
                     let value = self.variables.get(name, &places, &argument.columns)?;
-                    Whole::of(whole.variable_type(), Some(&value), 0, &argument.columns)?
+                    Whole::of(whole.variable_type(), &value, 0, &argument.columns)?
                 };
                 let indices = places.into_iter().map(constant).collect();
                 (Target::Variable { name: name.clone(), indices }, whole)

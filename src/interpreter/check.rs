@@ -163,6 +163,9 @@ fn every_line(source: &ProgramSource, dialect: &Dialect) -> Vec<Diagnostic> {
     parsed.map(|(cursor, fault)| placed(source, cursor, *fault)).collect()
 }
 
+/// Names of components of frames stand in brackets only.
+const COMPONENTS: [&str; 5] = ["TR", "FI", "RT", "SC", "MI"];
+
 /// Names without DEF and control words without partner. Only for programs whose every line can be read: a typo in a DEF or an ENDIF
 /// would be reported twice.
 fn names_and_partners(source: &ProgramSource, setup: &Setup, dialect: &Dialect) -> Vec<Diagnostic> {
@@ -189,7 +192,8 @@ fn names_and_partners(source: &ProgramSource, setup: &Setup, dialect: &Dialect) 
     for (cursor, line) in lines(source) {
         let Ok(block) = parse(&source.decode(&line), dialect) else { continue };
         let mut visit = |name: &Arc<str>, columns: &Columns| {
-            if !defined.contains(name) && reported.insert(name.clone()) {
+            let known = COMPONENTS.contains(&&**name) || dialect.axis(name).is_some();
+            if !known && !defined.contains(name) && reported.insert(name.clone()) {
                 let near = nearest(name, defined.iter().map(|known| &**known));
                 found.push(placed(source, cursor, *undeclared(name, near, columns)));
             }

@@ -253,6 +253,10 @@ impl Interpreter {
                 self.variables.set_parameter(number, value.number(value_columns)?, &index.columns)
             }
             Target::Variable { name, indices } => {
+                if let Some(dimensions) = self.variables.frame_dimensions(name) {
+                    let columns = (target_columns, value_columns);
+                    return self.set_user_frame(name, dimensions, indices, value, columns);
+                }
                 let indices = integers(indices, self)?;
                 self.variables.set(name, &indices, value, (target_columns, value_columns))
             }

@@ -49,7 +49,7 @@ impl Interpreter {
 
     /// Starts the positioning axes of a block.
     pub(super) fn start_positions(&mut self, block: &Collected) -> Outcome<()> {
-        let mut words = MotionWords { suppress_frames: block.motion.suppress_frames, ..MotionWords::default() };
+        let mut words = MotionWords { suppression: block.motion.suppression, ..MotionWords::default() };
         for (axis, word) in &block.positions.words {
             if block.motion.axes[*axis].is_some() {
                 let message = "an axis of the path cannot be positioned in the same block";
@@ -62,10 +62,12 @@ impl Interpreter {
             return Ok(());
         }
         let end = self.end_point(&words)?;
+        self.check_work_area(&words, &MoveKind::Rapid, &end)?;
         self.check_travel(&words, end);
-        self.note_applied(&words);
-        let named = words.axes.map(|word| word.is_some());
+        let named = PerAxis::from_fn(|axis| words.axes[axis].is_some());
+        let start = self.position;
         self.position_axes(end, named, false);
+        self.note_programmed(&words, start);
         Ok(())
     }
 

@@ -3,15 +3,21 @@
 //! In: a [`ProgramSource`] and the [`Machine`]. Out: [`Move`]s, warnings, at most one alarm. Words are executed in `block`, motion
 //! in `motion`, jumps and loops in `flow`.
 
+use super::active_frames::ActiveFrames;
 use super::call::{Head, ModalCall, Waiting};
 use super::flow::Repeat;
+use super::frame::GeometryAxes;
 use super::modal::Modal;
 use super::path_words::CornerWords;
-use super::setup::Setup;
+use super::placement::KnownPlace;
+use super::setup::{Setup, geometry_axes};
 use super::system_values::ChannelMemory;
+use super::tool_words::ToolState;
 use super::variables::Variables;
 use super::wire::{Event, Feed, MainRun, Move, MoveKind};
-use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
+use super::work_area::WorkArea;
+use super::zero_offsets::ZeroOffsets;
+use crate::base::{AxisVector, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
 use crate::program::structure::skip_level_of;
@@ -43,7 +49,7 @@ pub struct Interpreter {
     pub(super) machine: Arc<Machine>,
     pub(super) dialect: Arc<Dialect>,
     /// X, Y and Z of the machine: the geometry axes.
-    pub(super) geometry: [Option<AxisId>; 3],
+    pub(super) geometry: GeometryAxes,
     /// The line in execution.
     pub(super) current: Cursor,
     /// The line after it, or where a jump leads.
@@ -51,10 +57,18 @@ pub struct Interpreter {
     /// Running number of the block.
     pub(super) number: u64,
     pub(super) modal: Modal,
+    /// $P_UIFR and $P_UBFR.
+    pub(super) zero_offsets: Arc<ZeroOffsets>,
+    /// $P_UBFR was written since the last G500 or G54.
+    pub(super) basic_is_pending: bool,
+    pub(super) work_area: WorkArea,
+    pub(super) tools: ToolState,
     /// All axes where the last move ended.
     pub(super) position: PartPoint,
-    /// Translation that each axis had when it last moved.
-    pub(super) applied_lu: crate::base::AxisVector,
+    /// Where each axis was sent last, in the workpiece system of then: incremental words count from here.
+    pub(super) programmed_lu: AxisVector,
+    /// `position` in the workpiece system.
+    pub(super) known_place: KnownPlace,
     pub(super) variables: Variables,
     /// Markers, parameters and clocks of the channel.
     pub(super) memory: ChannelMemory,
@@ -122,19 +136,28 @@ impl Interpreter {
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
         }
+        let geometry = geometry_axes(machine);
+        let zero_offsets = setup.zero_offsets.clone();
+        let modal = Modal::new(&machine.feed, initial_frames(&zero_offsets, geometry));
+        let known_place = KnownPlace::new(modal.frames.clone(), position);
         let opened = source.opened(ProgramId(0));
         Self {
             program: ProgramId(0),
             window: Window::default(),
             dialect: Arc::new(Dialect::new(machine)),
-            geometry: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)),
+            geometry,
             current: source.first(),
             next: source.first(),
             number: 0,
-            modal: Modal::new(&machine.feed),
+            modal,
+            zero_offsets,
+            basic_is_pending: false,
+            work_area: WorkArea::default(),
+            tools: ToolState::new(setup.tools.clone()),
             position,
-            applied_lu: crate::base::AxisVector::zero(),
-            variables: Variables::default(),
+            programmed_lu: known_place.work_lu(),
+            known_place,
+            variables: Variables::new(geometry),
             memory: ChannelMemory::default(),
             main_run: MainRun::default(),
             trace_events: Vec::new(),
@@ -378,6 +401,14 @@ impl Memory {
             self.kept_blocks.insert(line, block.clone());
         }
     }
+}
+
+/// G500 and the basic frame.
+fn initial_frames(offsets: &ZeroOffsets, axes: GeometryAxes) -> ActiveFrames {
+    let mut frames = ActiveFrames::new(axes);
+    frames.set_basic(offsets.basic(axes));
+    frames.set_settable(0, offsets.settable(0, axes));
+    frames
 }
 
 /// The finding for a condition that is read otherwise than it looks.

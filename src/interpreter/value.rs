@@ -3,6 +3,7 @@
 //! In: values. Out: [`Value`], conversions with a finding where there is none. REAL to INT rounds half away from zero (the
 //! control's rule for assignments: a fraction of 0.5 or more is rounded up). Comparison of REAL is relative (1e-12).
 
+use super::frame::Frame;
 use crate::base::AxisId;
 use crate::program::{Columns, Fault, Outcome, codes};
 use std::cmp::Ordering;
@@ -24,6 +25,8 @@ pub enum Value {
     Text(Arc<str>),
     /// AXIS; `None` before the first assignment.
     Axis(Option<AxisId>),
+    /// FRAME.
+    Frame(Arc<Frame>),
 }
 
 impl Value {
@@ -40,6 +43,11 @@ impl Value {
             Self::Axis(_) => {
                 Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "an axis stands where a number is needed")
                     .label("expected a number"))
+            }
+            Self::Frame(_) => {
+                Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a frame stands where a number is needed")
+                    .label("expected a number")
+                    .help("[X,TR] behind its name gives a component"))
             }
         }
     }
@@ -67,7 +75,7 @@ impl Value {
             Self::Bool(value) => Some(Arc::from(if *value { "1" } else { "0" })),
             Self::Int(value) => Some(value.to_string().into()),
             Self::Real(value) => Some(trimmed(*value).into()),
-            Self::Axis(_) => None,
+            Self::Axis(_) | Self::Frame(_) => None,
         }
     }
 
@@ -77,6 +85,8 @@ impl Value {
             (Self::Text(a), Self::Text(b)) => Ok(a.cmp(b)),
             (Self::Int(a), Self::Int(b)) => Ok(a.cmp(b)),
             (Self::Axis(a), Self::Axis(b)) => Ok(a.cmp(b)),
+            // Frames are equal or not; there is no order.
+            (Self::Frame(a), Self::Frame(b)) => Ok(if a == b { Ordering::Equal } else { Ordering::Less }),
             _ => {
                 let (a, b) = (self.number(columns)?, other.number(columns)?);
                 if (a - b).abs() <= EQUAL_RATIO * a.abs().max(b.abs()) {

@@ -2,6 +2,7 @@
 //!
 //! In: definitions, assignments. Out: values. Memory is bounded. Undeclared names are findings with the nearest declared one.
 
+use super::frame::{Frame, GeometryAxes};
 use super::value::Value;
 use crate::base::diagnostics::nearest;
 use crate::program::syntax::VariableType;
@@ -25,6 +26,8 @@ pub struct Variables {
     /// GUD: known to all programs.
     global: BTreeMap<Arc<str>, Variable>,
     elements: usize,
+    /// Axes that the frames of a program turn.
+    frame_axes: GeometryAxes,
 }
 
 /// A whole variable, outside of [`Variables`].
@@ -33,11 +36,8 @@ pub struct Whole(Variable);
 
 impl Whole {
     /// A single value, converted to its type; `line` is where it is declared.
-    pub fn of(variable_type: VariableType, value: Option<&Value>, line: u32, columns: &Columns) -> Outcome<Self> {
-        let value = match value {
-            Some(value) => convert(variable_type, value, columns)?,
-            None => zero(variable_type, columns)?,
-        };
+    pub fn of(variable_type: VariableType, value: &Value, line: u32, columns: &Columns) -> Outcome<Self> {
+        let value = convert(variable_type, value, columns)?;
         Ok(Self(Variable { variable_type, line, dimensions: Vec::new(), values: vec![value] }))
     }
 
@@ -45,7 +45,7 @@ impl Whole {
     pub fn filled(
         variable_type: VariableType,
         sizes: &[i32],
-        value: Option<&Value>,
+        value: &Value,
         line: u32,
         columns: &Columns,
     ) -> Outcome<Self> {
@@ -88,17 +88,15 @@ impl Whole {
 }
 
 /// Value before the first assignment.
-fn zero(variable_type: VariableType, columns: &Columns) -> Outcome<Value> {
-    Ok(match variable_type {
+fn zero(variable_type: VariableType, frame_axes: GeometryAxes) -> Value {
+    match variable_type {
         VariableType::Bool => Value::Bool(false),
         VariableType::Char | VariableType::Int => Value::Int(0),
         VariableType::Real => Value::Real(0.0),
         VariableType::Text(_) => Value::Text(Arc::from("")),
         VariableType::Axis => Value::Axis(None),
-        VariableType::Frame => {
-            return Err(Fault::new(codes::NOT_BUILT, columns.clone(), "FRAME: not built yet").label("not built yet"));
-        }
-    })
+        VariableType::Frame => Value::Frame(Arc::new(Frame::identity(frame_axes))),
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -121,6 +119,17 @@ impl Variables {
     pub fn leave(&mut self) {
         let gone = std::mem::replace(&mut self.declared, self.waiting.pop().unwrap_or_default());
         self.elements -= gone.values().map(|variable| variable.values.len()).sum::<usize>();
+    }
+
+    /// None yet; frames of the program turn these axes.
+    pub fn new(frame_axes: GeometryAxes) -> Self {
+        Self { frame_axes, ..Self::default() }
+    }
+
+    /// Number of dimensions of a variable of type FRAME; `None`: it is none.
+    pub fn frame_dimensions(&self, name: &str) -> Option<usize> {
+        let variable = self.find(name).filter(|variable| variable.variable_type == VariableType::Frame)?;
+        Some(variable.dimensions.len())
     }
 
     /// R parameter; 0 before the first assignment.
@@ -204,10 +213,15 @@ impl Variables {
             .label(format!("at most {ELEMENTS_MAX}")));
         }
         self.elements = elements;
-        let zero = zero(variable_type, columns)?;
+        let zero = zero(variable_type, self.frame_axes);
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
         Ok(())
+    }
+
+    /// What a variable of that type holds before the first assignment.
+    pub fn initial(&self, variable_type: VariableType) -> Value {
+        zero(variable_type, self.frame_axes)
     }
 
     /// A whole variable, to be handed to a sub-program.
@@ -391,8 +405,11 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
                 .label("expected the name of an axis")
                 .help("AXNAME makes an axis of a text"));
         }
-        // DEF refuses it.
-        (VariableType::Frame, value) => value.clone(),
+        (VariableType::Frame, Value::Frame(_)) => value.clone(),
+        (VariableType::Frame, _) => {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only a frame can be stored in a FRAME")
+                .label("expected a frame such as CTRANS(X, 10)"));
+        }
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),
         (VariableType::Real, value) => Value::Real(value.number(columns)?),
         (VariableType::Int, value) => Value::Int(value.integer(columns)?),

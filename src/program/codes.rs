@@ -112,6 +112,10 @@ codes! {
     ARC_PLANE "E0506" "A plane whose axes the machine does not have";
     DWELL "E0507" "A G4 without a time, or with revolutions of a spindle that stands";
     MODULO "E0508" "DC, ACP or ACN for an axis that is not endless";
+    UNEQUAL_SCALE "E0509" "A circle that the frames would make an ellipse";
+    BAD_FRAME "E0510" "A frame that is not possible";
+    WORK_AREA "E0511" "A position outside the work area";
+    UNKNOWN_TOOL "E0512" "A tool or an edge that the tool table does not have";
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";
     CHECK_STOPPED "W0003" "The check did not run the program to its end";

@@ -130,5 +130,5 @@ pub static NOT_ACTED_ON: &[NotActedOn] = &[
     entry("DO", "the synchronised action is not executed"),
     entry("CANCEL", "the synchronised action is not executed"),
     entry("$AN_SLTRACE", "the recording is not marked"),
-    entry("$TC_", "tool data are not kept: positions are those of the tool tip with length 0"),
+    entry("$TC_", "tool data other than those of edges ($TC_DP1 to 25) and names ($TC_TP2) are not kept"),
 ];

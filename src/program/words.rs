@@ -417,8 +417,8 @@ impl Function {
             Self::Substr => (2, 3),
             Self::Bound => (3, 3),
             Self::Sprint => (1, 11),
-            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (2, 16),
-            Self::Cmirror => (1, 8),
+            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (0, 16),
+            Self::Cmirror => (0, 8),
             _ => (1, 1),
         }
     }

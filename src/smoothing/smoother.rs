@@ -24,6 +24,8 @@ use crate::program::BlockRef;
 pub struct Smoother {
     rules: Rules,
     position: PartPoint,
+    /// Where the last move ended: a move without motion that ends elsewhere has another tool.
+    told: PartPoint,
     held: Option<Held>,
     /// Blocks without motion that wait for the next piece; `block`, `feed` and `modes` are those of the last of them, for the
     /// case that no piece follows.
@@ -62,6 +64,7 @@ impl Smoother {
         Self {
             rules: Rules::new(machine),
             position,
+            told: position,
             held: None,
             carried: None,
             unrounded: Unrounded::default(),
@@ -72,6 +75,7 @@ impl Smoother {
     /// Takes the next move; hands over the pieces that it decides.
     pub fn push(&mut self, next: Move, out: &mut impl FnMut(ContourPiece)) {
         self.unrounded.watch(&next.events);
+        self.follow_tip(&next, out);
         let linear = self.rules.linear();
         match &next.kind {
             MoveKind::Rapid | MoveKind::Line => {
@@ -103,6 +107,22 @@ impl Smoother {
             MoveKind::StopPreparation => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: true } => self.push_wait(next, 0.0, out),
             MoveKind::Function { stops: false } => self.carry(next, 0),
+        }
+    }
+
+    /// The axes stand and the tip of another tool is elsewhere: the path ends here and goes on there.
+    fn follow_tip(&mut self, next: &Move, out: &mut impl FnMut(ContourPiece)) {
+        let before = std::mem::replace(&mut self.told, next.end);
+        let stands = matches!(
+            next.kind,
+            MoveKind::Function { .. }
+                | MoveKind::Dwell { .. }
+                | MoveKind::WaitPositioned(_)
+                | MoveKind::StopPreparation
+        );
+        if stands && next.end != before {
+            self.rest(out);
+            self.position.0 += next.end.0 - before.0;
         }
     }
 
