@@ -23,7 +23,8 @@ pub fn text(bytes: &[u8]) {
     for machine in &*MACHINES {
         let dialect = Dialect::new(machine);
         let mut cursor = source.first();
-        while let Some((line, next)) = source.line_bytes(cursor) {
+        let mut window = sollwert::program::Window::default();
+        while let Ok(Some((line, next))) = source.line(&mut window, cursor) {
             let _ = plain_block(line, &dialect);
             let text = source.line_text(cursor);
             match parse(&text, &dialect) {
@@ -34,7 +35,7 @@ pub fn text(bytes: &[u8]) {
                     assert_eq!(print(&again, &dialect), printed, "`{text}`");
                 }
                 Err(fault) => {
-                    let shown = fault.at("fuzz.mpf".into(), cursor.line, text.into_owned());
+                    let shown = fault.at("fuzz.mpf".into(), cursor.line, text.into());
                     assert!(!shown.render(false).is_empty());
                 }
             }
