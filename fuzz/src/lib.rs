@@ -25,7 +25,7 @@ pub fn text(bytes: &[u8]) {
         let mut cursor = source.first();
         let mut window = sollwert::program::Window::default();
         while let Ok(Some((line, next))) = source.line(&mut window, cursor) {
-            let _ = plain_block(line, &dialect);
+            let _ = plain_block(&line, &dialect);
             let text = source.line_text(cursor);
             match parse(&text, &dialect) {
                 Ok(block) => {
@@ -35,7 +35,7 @@ pub fn text(bytes: &[u8]) {
                     assert_eq!(print(&again, &dialect), printed, "`{text}`");
                 }
                 Err(fault) => {
-                    let shown = fault.at("fuzz.mpf".into(), cursor.line, text.into());
+                    let shown = fault.at("fuzz.mpf".into(), cursor.line, text);
                     assert!(!shown.render(false).is_empty());
                 }
             }
