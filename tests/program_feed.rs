@@ -283,7 +283,10 @@ fn g95_and_g96_follow_the_spindle() {
     assert!(alarm(&m, "F100 G95\nG1 X10\nM30\n").contains("no F"));
     // S = 100 m/min at r = 20 mm; LIMS bounds it; G97 keeps it.
     let rpm = 100_000.0 / (2.0 * PI * 20.0);
-    let found = moves(&m, "G0 X20\nG96 S100 M3 F0.3\nG1 Z10\nLIMS=500\nZ20\nG97\nZ30\nG26 S400\nM30\n".replace("G26 S400\n", "").as_str());
+    let found = moves(
+        &m,
+        "G0 X20\nG96 S100 M3 F0.3\nG1 Z10\nLIMS=500\nZ20\nG97\nZ30\nG26 S400\nM30\n".replace("G26 S400\n", "").as_str(),
+    );
     let speeds: Vec<f64> = motions(&found)[1..].iter().map(|next| feeds(next)[0] / 0.3 * 60.0).collect();
     for (value, expected) in speeds.iter().zip([rpm, 500.0, 500.0]) {
         close(*value, expected);
@@ -303,7 +306,8 @@ fn g95_and_g96_follow_the_spindle() {
     }
     // G4 S counts the revolutions of that speed.
     let found = moves(&m, "G0 X20\nG96 S100 M3 F0.3\nG4 S10\nM30\n");
-    let time_s = found.iter().find_map(|next| if let MoveKind::Dwell { time_s } = next.kind { Some(time_s) } else { None });
+    let time_s =
+        found.iter().find_map(|next| if let MoveKind::Dwell { time_s } = next.kind { Some(time_s) } else { None });
     close(time_s.unwrap(), 10.0 / rpm * 60.0);
 }
 
