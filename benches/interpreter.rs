@@ -1,5 +1,5 @@
 //! Blocks per second from text to moves, one core: what a CAM program is made of, the same with blocks that take the whole parser,
-//! and a loop with expressions.
+//! a loop with expressions, and a sub-program that is called again and again.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use sollwert::interpreter::Interpreter;
@@ -49,6 +49,16 @@ fn interpreter(criterion: &mut Criterion) {
                 "loop.mpf",
                 format!("DEF INT COUNT\nG1 F2000\nFOR COUNT=1 TO {BLOCKS}\nX=COUNT/1000 Y=COUNT MOD 7\nENDFOR\nM30\n")
                     .into_bytes(),
+            ),
+        ),
+        (
+            "calls",
+            ProgramSource::from_bytes(
+                "calls.mpf",
+                format!(
+                    "%_N_CALLS_MPF\nG91 G1 F2000\nFOR R1=1 TO {BLOCKS}\nSTEP_UP\nENDFOR\nM30\n%_N_STEP_UP_SPF\nX0.001 Y=R1/1000\nRET\n"
+                )
+                .into_bytes(),
             ),
         ),
     ];

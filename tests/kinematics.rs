@@ -172,6 +172,7 @@ fn joint_path_is_the_contour_axis_by_axis() {
         modes: modes.clone(),
         events: Vec::new(),
         blocks_begun: 1,
+        block_length_lu: None,
         stop_at_end: true,
     };
     let (start, end) = (PartPoint::default(), PartPoint(vector(&[3.0, 4.0, 0.0, 0.0, 1.0])));

@@ -1,8 +1,11 @@
 //! Feed, dynamics, spindles and positioning axes, from the word to the set-point: closed forms and differences of positions.
 
+#[path = "random/mod.rs"]
+mod random;
 #[path = "test_machine/mod.rs"]
 mod test_machine;
 
+use random::Random;
 use sollwert::base::AxisId;
 use sollwert::interpreter::{Event, Feed, Interpreter, Move, MoveKind};
 use sollwert::kernel::{Kernel, Status};
@@ -176,7 +179,7 @@ fn dynamics_sets_and_drive_change_the_limits() {
     run("DYNROUGH").lasts(rest_to_rest_s(400.0, V, A / 2.0, J));
     run("DYNFINISH").lasts(rest_to_rest_s(400.0, V, A, 6000.0));
     run("DYNPREC").lasts(rest_to_rest_s(400.0, V, A, 6000.0));
-    run("DYNROUGH ACC[X]=50").lasts(rest_to_rest_s(400.0, V, A / 4.0, J));
+    run("DYNROUGH ACC[X]=80").lasts(rest_to_rest_s(400.0, V, 0.4 * A, J));
     run("DYNPOS").lasts(rest_to_rest_s(400.0, V, A, J));
     // BRISK: L/v + v/a. DRIVE: slower, and above half the velocity never more than 60 % of the acceleration.
     run("BRISK").lasts(400.0 / V + V / A);
@@ -210,7 +213,7 @@ fn overrides_hold_by_name() {
     let m = machine(&[]);
     let run = replay(&m, "SOFT G60 OVR=50\nG1 X100 F6000\nM30\n");
     run.lasts(100.0 / 50.0 + 2.0 * (50.0 / J).sqrt());
-    assert!(run.share("override") > 0.9 && run.share("feed") == 0.0);
+    assert!(run.share("override") > 0.85 && run.share("feed") < 0.01);
     let run = replay(&m, "SOFT G60 OVR=150\nG1 X100 F6000\nM30\n");
     run.lasts(rest_to_rest_s(100.0, 150.0, A, J));
     assert!(run.share("feed") > 0.5);
@@ -280,13 +283,10 @@ fn g95_and_g96_follow_the_spindle() {
     }
     assert!(alarm(&m, "S1200 G95 F0.1\nG1 X10\nM30\n").contains("the spindle stands"));
     assert!(alarm(&m, "M3 G95 F0.1\nG1 X10\nM30\n").contains("no spindle speed"));
-    assert!(alarm(&m, "F100 G95\nG1 X10\nM30\n").contains("no F"));
+    assert!(alarm(&m, "F100\nG95 M3 S100\nG1 X10\nM30\n").contains("no F"));
     // S = 100 m/min at r = 20 mm; LIMS bounds it; G97 keeps it.
     let rpm = 100_000.0 / (2.0 * PI * 20.0);
-    let found = moves(
-        &m,
-        "G0 X20\nG96 S100 M3 F0.3\nG1 Z10\nLIMS=500\nZ20\nG97\nZ30\nG26 S400\nM30\n".replace("G26 S400\n", "").as_str(),
-    );
+    let found = moves(&m, "G0 X20\nG96 S100 M3 F0.3\nG1 Z10\nLIMS=500\nZ20\nG97\nZ30\nM30\n");
     let speeds: Vec<f64> = motions(&found)[1..].iter().map(|next| feeds(next)[0] / 0.3 * 60.0).collect();
     for (value, expected) in speeds.iter().zip([rpm, 500.0, 500.0]) {
         close(*value, expected);
@@ -327,6 +327,37 @@ fn flin_and_fcub_lead_from_one_f_to_the_next() {
 }
 
 #[test]
+fn a_changing_feed_is_driven_along_the_block() {
+    let m = machine(&[]);
+    let lasts = |run: &Replay, line: u32| run.rows.iter().filter(|row| row.line == line).count() as f64 * run.t_s;
+    // Facing with F of a revolution and a constant cutting speed v: dt = 2 pi r dr / (F v), so t = pi (r0² - r1²) / (F v). Both ramps
+    // to and from rest come on top, half their time each: sqrt(f / J).
+    let (f_v, r0, r1) = (0.3 * 100_000.0 / 60.0, 40.0, 10.0);
+    let feed = |r: f64| f_v / (2.0 * PI * r);
+    let run = replay(&m, "SOFT G60\nG0 X40\nG96 S100 M3 F0.3\nG1 X10\nM30\n");
+    let expected_s = PI * (r0 * r0 - r1 * r1) / f_v + (feed(r0) / J).sqrt() + (feed(r1) / J).sqrt();
+    assert!((lasts(&run, 4) - expected_s).abs() < 0.02, "{} s, expected {expected_s} s", lasts(&run, 4));
+    run.within(0, [V, A, J]);
+    for row in run.rows.iter().filter(|row| row.line == 4 && (11.0..39.0).contains(&row.q[0])) {
+        let ratio = row.velocity[0].abs() / feed(row.q[0]);
+        // A stretch has the feed of its middle; it is 30/32 mm long.
+        assert!((ratio - 1.0).abs() < 0.6 * 30.0 / 32.0 / row.q[0] + 0.06, "{ratio} at {}", row.q[0]);
+    }
+    // The end of a linear change: t = L ln(f1/f0) / (f1 - f0); the path does not stop at the borders of the stretches.
+    for (words, time_s) in [("G64 FLIN", 100.0 * 2.0_f64.ln() / 10.0), ("G64 FNORM", 100.0 / 20.0)] {
+        let run = replay(&m, &format!("SOFT G64\nF600 G1 X10\n{words}\nX110 F1200\nX120\nM30\n"));
+        assert!((lasts(&run, 4) - time_s).abs() < 0.02, "{words}: {} s, expected {time_s} s", lasts(&run, 4));
+        run.within(0, [V, A, J]);
+        assert!(run.rows.iter().filter(|row| row.line == 4).all(|row| row.velocity[0] > 9.9));
+    }
+    // On an arc too, and where the block is too short for stretches the lowest feed holds.
+    let run = replay(&m, "SOFT G64\nF600 G1 X10\nFLIN\nG3 X10 Y40 J20 F1200\nG1 X0\nM30\n");
+    assert!((lasts(&run, 4) - 20.0 * PI * 2.0_f64.ln() / 10.0).abs() < 0.03);
+    let run = replay(&m, "SOFT G64\nF600 G1 X10\nFLIN\nX10.01 F1200\nX20\nM30\n");
+    assert!(run.rows.iter().filter(|row| row.line == 4).all(|row| row.velocity[0] < 10.0 + 1e-9));
+}
+
+#[test]
 fn pos_takes_its_own_time_and_posa_runs_beside_the_path() {
     let m = machine(&[]);
     let alone_s = rest_to_rest_s(300.0, V, A, J);
@@ -360,6 +391,45 @@ fn pos_takes_its_own_time_and_posa_runs_beside_the_path() {
     let run = replay(&m, "SOFT G60\nG1 X1 F600 POS[U]=300\nX2\nM30\n");
     run.lasts(alone_s + x_s);
     assert!(alarm(&m, "G1 U10 F100 POS[U]=300\nM30\n").contains("positioned"));
+}
+
+#[test]
+fn axes_of_a_transformation_cannot_move_on_their_own() {
+    let m = sollwert::machine::load("xyzbc", &[]).unwrap().machine;
+    for axis in ["X", "B", "C"] {
+        assert!(alarm(&m, &format!("POS[{axis}]=10\nM30\n")).contains("transformation"));
+    }
+}
+
+#[test]
+fn random_positioning_beside_a_path_is_continuous_and_within_the_limits() {
+    let m = machine(&[]);
+    for seed in 0..40 {
+        let mut random = Random::new(seed);
+        let mut text = String::from("SOFT G60 F6000\n");
+        for _ in 0..12 {
+            let at = |random: &mut Random, most: f64| (random.between(0.0, most) * 1000.0).round() / 1000.0;
+            let (u, x, y) = (at(&mut random, 200.0), at(&mut random, 60.0), at(&mut random, 60.0));
+            text += &match random.below(9) {
+                0 | 1 => format!("POSA[U]={u}\n"),
+                2 => format!("POS[U]={u}\n"),
+                3 => format!("G1 X{x} Y{y} POS[U]={u}\n"),
+                4 => format!("G1 X{x} Y{y} POSA[U]={u}\n"),
+                5 => format!("G1 X{x} U{u}\n"),
+                6 => format!("ACC[U]={} VELOLIM[U]={} JERKLIM[U]={}\n", 20.0 + u / 4.0, 30.0 + x, 40.0 + y),
+                7 => format!("FA[U]={}\n", 500.0 + 80.0 * u),
+                _ => format!("G1 X{x} Y{y}\n"),
+            };
+        }
+        text += "M30\n";
+        let run = replay(&m, &text);
+        for axis in [0, 1, 3] {
+            run.within(axis, [V, A, J]);
+        }
+        // It ends where it was sent last.
+        let moved = moves(&m, &text).last().unwrap().end;
+        assert_eq!(run.rows.last().unwrap().q[3], moved.0[AxisId::new(3)], "{text}");
+    }
 }
 
 #[test]

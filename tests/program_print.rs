@@ -8,7 +8,7 @@ mod random;
 
 use nc_machine::{xyz, xyzbc};
 use random::Random;
-use sollwert::program::{Block, Dialect, ProgramSource, parse, print};
+use sollwert::program::{Block, Dialect, ProgramSource, Window, parse, print};
 use std::path::{Path, PathBuf};
 
 /// The tree as text, without columns.
@@ -58,8 +58,8 @@ fn every_line_of_every_program_comes_back() {
     let mut lines = 0;
     for path in paths {
         let source = ProgramSource::from_file(&path).unwrap();
-        let mut cursor = source.first();
-        while let Some((_, next)) = source.line_bytes(cursor) {
+        let (mut cursor, mut window) = (source.first(), Window::default());
+        while let Some((_, next)) = source.line(&mut window, cursor).unwrap() {
             lines += usize::from(dialects.iter().any(|dialect| comes_back(&source.line_text(cursor), dialect)));
             cursor = next;
         }

@@ -78,12 +78,21 @@ pub struct Diagnostic {
     pub place: Option<Place>,
     /// What to do, in one sentence; the nearest known word, the allowed range.
     pub help: Option<String>,
+    /// File and line of the calls that led to the place, innermost first; empty in a main program.
+    pub called_from: Vec<(Arc<str>, u32)>,
 }
 
 impl Diagnostic {
     /// A new error.
     pub fn error(code: &'static str, message: impl Into<String>) -> Self {
-        Self { code, severity: Severity::Error, message: message.into(), place: None, help: None }
+        Self {
+            code,
+            severity: Severity::Error,
+            message: message.into(),
+            place: None,
+            help: None,
+            called_from: Vec::new(),
+        }
     }
 
     /// A new warning.
@@ -135,6 +144,9 @@ impl Diagnostic {
         }
         if let Some(help) = &self.help {
             group = group.element(Level::HELP.message(help.as_str()));
+        }
+        for (file, line) in &self.called_from {
+            group = group.element(Level::NOTE.message(format!("called from {file}:{line}")));
         }
         let renderer = if colour { Renderer::styled() } else { Renderer::plain() };
         renderer.render(&[group])

@@ -29,7 +29,7 @@ pub(super) struct CheckArguments {
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load()?;
-    let setup = arguments.surroundings.open(&arguments.program)?;
+    let setup = arguments.surroundings.open(&arguments.program, &machine.machine)?;
     let program = &setup.program;
     let findings = interpreter::check(&setup, &machine.machine);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::output::show;
 use crate::base::Diagnostic;
 use crate::interpreter::Setup;
-use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, load, unsupported};
+use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, unsupported};
 use crate::program::{ProgramSource, taken_axis_names};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -64,11 +64,17 @@ pub(super) struct Surroundings {
     /// Skip levels to activate, such as 0,3: blocks with / or /3 are not executed
     #[arg(long = "skip", value_name = "LEVELS", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(0..=9))]
     skip: Vec<u8>,
+    /// Tool table (docs/workshop-file.md); without one the length of every tool is 0
+    #[arg(short, long, value_name = "TOOLS.toml")]
+    tools: Option<PathBuf>,
+    /// Zero offsets (G54 and so on) of the same form; may also stand in the file of the tools
+    #[arg(short = 'z', long, value_name = "OFFSETS.toml")]
+    offsets: Option<PathBuf>,
 }
 
 impl Surroundings {
     /// Opens a program with what lies around it.
-    pub(super) fn open(&self, program: &Path) -> Result<Setup, Failure> {
+    pub(super) fn open(&self, program: &Path, machine: &Machine) -> Result<Setup, Failure> {
         let mut definitions = self.definitions.clone();
         if definitions.is_empty() {
             definitions = definitions_beside(program);
@@ -79,12 +85,22 @@ impl Surroundings {
             }
         }
         let open = |path: &PathBuf| ProgramSource::from_file(path).map_err(Failure::unreadable);
-        Ok(Setup {
+        let mut setup = Setup {
             directories: self.include.clone(),
+            shipped: SHIPPED_PROGRAMS,
             definitions: definitions.iter().map(open).collect::<Result<_, _>>()?,
             skip_levels: self.skip.iter().fold(0, |levels, level| levels | 1 << level),
             ..Setup::from(open_program(program)?)
-        })
+        };
+        for path in self.workshop_files() {
+            setup.add_workshop(load_workshop(path, machine).map_err(refused)?, machine);
+        }
+        Ok(setup)
+    }
+
+    /// Files of tools and zero offsets.
+    pub(super) fn workshop_files(&self) -> impl Iterator<Item = &Path> {
+        self.tools.iter().chain(&self.offsets).map(PathBuf::as_path)
     }
 }
 

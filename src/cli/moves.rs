@@ -29,7 +29,7 @@ pub(super) struct MovesArguments {
 
 pub(super) fn moves(arguments: &MovesArguments) -> Result<(), Failure> {
     let loaded = arguments.machine.load()?;
-    let setup = Setup { lists_only: true, ..arguments.surroundings.open(&arguments.program)? };
+    let setup = Setup { lists_only: true, ..arguments.surroundings.open(&arguments.program, &loaded.machine)? };
     let mut interpreter = Interpreter::new(setup, &loaded.machine);
     let mut listing = Listing::new(&loaded.machine);
     // Streamed: the program may have ten million blocks. A closed pipe is the reader's way to say "enough".

@@ -57,9 +57,10 @@ fn positive(text: &str) -> Result<f64, String> {
 
 pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let machine = arguments.machine.load_to_run()?;
-    let setup = arguments.surroundings.open(&arguments.program)?;
+    let setup = arguments.surroundings.open(&arguments.program, &machine.machine)?;
     let recording = arguments.output.clone().unwrap_or_else(|| default_recording(&arguments.program));
-    refuse_same_file([arguments.program.as_path()].into_iter().chain(arguments.machine.path()), &recording)?;
+    let inputs = [arguments.program.as_path()].into_iter().chain(arguments.machine.path());
+    refuse_same_file(inputs.chain(arguments.surroundings.workshop_files()), &recording)?;
     let mut signals = parse_signals(arguments.record.as_deref(), &machine)?;
     if arguments.no_drives {
         // Without drives every wire behind the set-point is a copy of it: only what was computed is recorded.

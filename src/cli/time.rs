@@ -59,7 +59,7 @@ pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
 }
 
 fn one(path: &Path, machine: &Loaded, arguments: &TimeArguments) -> Result<RunOutcome, Failure> {
-    let setup = arguments.surroundings.open(path)?;
+    let setup = arguments.surroundings.open(path, &machine.machine)?;
     let options = RunOptions {
         machine,
         setup,

@@ -9,14 +9,14 @@ use super::blend_limits;
 use super::group::FeedGroup;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use super::ramp::Dynamics;
+use super::worst::Worst;
 use super::{Limit, LimitKind};
 use crate::base::AxisId;
-use crate::geometry::{Arc, Curve, CurveState};
+use crate::geometry::Curve;
 use crate::interpreter::{Feed, Modes, ProgrammedLimits};
 use crate::kinematics::JointState;
 use crate::machine::{AccelerationMode, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine};
 use crate::smoothing::ContourPiece;
-use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The jerk that is left on an arc is split in these many parts between its two uses.
 const JERK_SHARES: u32 = 16;
@@ -103,6 +103,9 @@ pub(super) struct Ends {
     pub rotary_only: bool,
 }
 
+/// Which jerk of an axis holds.
+type JerkMax = fn(&AxisLimits) -> f64;
+
 impl AxisRules {
     /// The limits that hold under `modes`.
     pub(super) fn new(machine: &Machine, modes: &Modes) -> Self {
@@ -183,10 +186,11 @@ impl AxisRules {
     }
 
     /// Limits of a piece on its curve.
-    pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
-        let limits = self.on_curve(piece, curve, ends);
+    /// `worst` are the greatest demands along a curve that has no closed form for them.
+    pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends, worst: Option<&Worst>) -> PieceLimits {
+        let limits = self.on_curve(piece, curve, ends, worst);
         let Some(drive) = &self.drive else { return limits };
-        let mut slow = drive.slow.on_curve(piece, curve, ends);
+        let mut slow = drive.slow.on_curve(piece, curve, ends, worst);
         if slow.cap.velocity_lu_s >= limits.cap.velocity_lu_s {
             return limits;
         }
@@ -195,23 +199,31 @@ impl AxisRules {
             let limit = Limit { kind: LimitKind::Acceleration, ..slow.cap.limit };
             (slow.cap.limit, slow.ramp_cap.limit, slow.bounds.cruise.limit) = (limit, limit, limit);
         }
-        let weak = drive.weak.on_curve(piece, curve, ends);
+        let weak = drive.weak.on_curve(piece, curve, ends, worst);
         let length_lu = curve.length_lu();
         if weak.alone_s(length_lu) < slow.alone_s(length_lu) { weak } else { slow }
     }
 
-    fn on_curve(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends) -> PieceLimits {
+    fn on_curve(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends, worst: Option<&Worst>) -> PieceLimits {
         let feed = self.feed_cap(&piece.feed, curve);
         let jerk_limited = self.jerk_limited;
+        let in_block: JerkMax = |limits| limits.jerk_max_lu_s3;
+        let in_blend: JerkMax = |limits| limits.transition_jerk_max_lu_s3;
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
-            Curve::Arc(arc) => self.arc(arc, feed, jerk_limited),
+            Curve::Arc(arc) => self.curved(&Worst::on_arc(arc), in_block, feed, jerk_limited),
+            Curve::SpatialArc(arc) => self.curved(&Worst::on_spatial_arc(arc), in_block, feed, jerk_limited),
+            Curve::Polynomial(_) => match worst {
+                Some(worst) => self.curved(worst, if ends.blend { in_blend } else { in_block }, feed, jerk_limited),
+                // Unknown demands allow nothing: the planner refuses the piece.
+                None => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
+            },
             Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
         }
     }
 
     /// F along s, with OVR.
-    fn feed_cap(&self, feed: &Feed, curve: &Curve) -> FeedCap {
+    pub(super) fn feed_cap(&self, feed: &Feed, curve: &Curve) -> FeedCap {
         let programmed_lu_s = match feed {
             Feed::Rapid => return FeedCap::Rapid,
             Feed::Path { feed_lu_s } => *feed_lu_s,
@@ -256,11 +268,11 @@ impl AxisRules {
 
     /// An arc or helix: the worst direction met on it (models/arcs.md section 4), with the radial shares of models/local-smoothing.md
     /// section 2, so that the sums over tangent and normal hold and not only each term.
-    fn arc(&self, arc: &Arc, feed: FeedCap, jerk_limited: bool) -> PieceLimits {
-        let worst = WorstOnArc::new(arc);
+    /// The same for any other curve.
+    fn curved(&self, worst: &Worst, jerk_max: JerkMax, feed: FeedCap, jerk_limited: bool) -> PieceLimits {
         let (ra, rj) = (self.radial_acceleration_share, self.radial_jerk_share);
         let radial = self.largest(|axis, limits| worst.second(axis) / (ra * limits.acceleration_max_lu_s2));
-        let turning = self.largest(|axis, limits| worst.third(axis) / (rj * limits.jerk_max_lu_s3));
+        let turning = self.largest(|axis, limits| worst.third(axis) / (rj * jerk_max(limits)));
         let mut cap = self.driven(feed, |axis| worst.first(axis));
         cap = cap.min(radial.cap(LimitKind::RadialAcceleration, 2));
         if jerk_limited {
@@ -271,16 +283,15 @@ impl AxisRules {
         if !jerk_limited {
             return PieceLimits::new(cap, cap, acceleration, acceleration, jerk_limited);
         }
-        let left =
-            |axis: AxisId, limits: &AxisLimits| limits.jerk_max_lu_s3 - cap.velocity_lu_s.powi(3) * worst.third(axis);
-        self.share_jerk(&worst, cap, acceleration, left)
+        let left = |axis: AxisId, limits: &AxisLimits| jerk_max(limits) - cap.velocity_lu_s.powi(3) * worst.third(axis);
+        self.share_jerk(worst, cap, acceleration, left)
     }
 
     /// Splits the jerk that turning leaves between `3 v a |q''|` and `j |q'|`: among some splits that one which reaches the cap
     /// from rest in the shortest time. `left` is positive for every axis: turning takes R_J of the jerk at most.
     fn share_jerk(
         &self,
-        worst: &WorstOnArc,
+        worst: &Worst,
         cap: SpeedCap,
         acceleration: Demand,
         left: impl Fn(AxisId, &AxisLimits) -> f64,
@@ -349,6 +360,17 @@ impl PieceLimits {
         Self { cap, ramp_cap, bounds }
     }
 
+    /// About what is left for changes of speed on a curve, to judge how much way one takes.
+    pub(super) fn rough_dynamics(rules: &AxisRules, worst: &Worst) -> Dynamics {
+        let (ra, rj) = (rules.radial_acceleration_share, rules.radial_jerk_share);
+        let a = rules.largest(|axis, limits| worst.first(axis) / ((1.0 - ra) * limits.acceleration_max_lu_s2));
+        let j = rules.largest(|axis, limits| worst.first(axis) / ((1.0 - rj) * limits.jerk_max_lu_s3));
+        Dynamics {
+            acceleration_lu_s2: 1.0 / a.demand_ratio,
+            jerk_lu_s3: rules.jerk_limited.then_some(1.0 / j.demand_ratio),
+        }
+    }
+
     /// Time from rest to rest.
     fn alone_s(&self, length_lu: f64) -> f64 {
         let rest = SpeedCap { velocity_lu_s: 0.0, limit: self.cap.limit };
@@ -396,63 +418,5 @@ pub(super) fn axis_limits(machine: &Machine, id: AxisId, modes: &Modes) -> AxisL
         acceleration_max_lu_s2: limits.acceleration_max_lu_s2 * programmed.acceleration_ratio[id],
         jerk_max_lu_s3: limits.jerk_max_lu_s3 * jerk,
         transition_jerk_max_lu_s3: limits.transition_jerk_max_lu_s3 * jerk,
-    }
-}
-
-/// Largest |q'|, |q''| and |q'''| of each axis over an arc: axis-parallel directions between its ends included.
-struct WorstOnArc {
-    /// |cos| of the polar angle, its largest; |sin| likewise.
-    cos_ratio: f64,
-    sin_ratio: f64,
-    state: CurveState,
-    plane: [AxisId; 2],
-    radius_mm: f64,
-    turn_rate_per_mm: f64,
-}
-
-impl WorstOnArc {
-    fn new(arc: &Arc) -> Self {
-        let (a, b) = (arc.angle_start_rad(), arc.angle_end_rad());
-        let (low, high) = (a.min(b), a.max(b));
-        // |cos| is 1 at multiples of pi, |sin| a quarter turn further.
-        let meets = |offset_rad: f64| ((low - offset_rad) / PI).ceil() * PI + offset_rad <= high;
-        let cos_ratio = if meets(0.0) { 1.0 } else { a.cos().abs().max(b.cos().abs()) };
-        let sin_ratio = if meets(FRAC_PI_2) { 1.0 } else { a.sin().abs().max(b.sin().abs()) };
-        Self {
-            cos_ratio,
-            sin_ratio,
-            state: arc.at(0.0),
-            plane: arc.plane(),
-            radius_mm: arc.radius_mm().abs(),
-            turn_rate_per_mm: arc.turn_rate_per_mm().abs(),
-        }
-    }
-
-    /// Largest share of the axis in the tangent (`along`) or in the normal.
-    fn in_plane(&self, axis: AxisId, along: bool) -> f64 {
-        let [first, second] = self.plane;
-        if axis == first {
-            if along { self.sin_ratio } else { self.cos_ratio }
-        } else if axis == second {
-            if along { self.cos_ratio } else { self.sin_ratio }
-        } else {
-            0.0
-        }
-    }
-
-    fn first(&self, axis: AxisId) -> f64 {
-        if self.plane.contains(&axis) {
-            self.radius_mm * self.turn_rate_per_mm * self.in_plane(axis, true)
-        } else {
-            self.state.first[axis].abs()
-        }
-    }
-
-    fn second(&self, axis: AxisId) -> f64 {
-        self.radius_mm * self.turn_rate_per_mm.powi(2) * self.in_plane(axis, false)
-    }
-
-    fn third(&self, axis: AxisId) -> f64 {
-        self.radius_mm * self.turn_rate_per_mm.powi(3) * self.in_plane(axis, true)
     }
 }

@@ -12,7 +12,11 @@ mod planner;
 mod positioning;
 pub mod profile;
 pub mod ramp;
+mod scan;
+mod split;
+mod varying;
 mod wire;
+mod worst;
 
 pub use planner::Planner;
 pub use wire::*;

@@ -14,8 +14,10 @@ use super::limits::{AxisRules, Ends, PieceLimits};
 use super::modes::ModeRules;
 use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
-use super::{Limit, LimitKind, PlannedPiece, TimeLaw};
+use super::split::{self, Part};
+use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
+use crate::geometry::Curve;
 use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
 use crate::machine::Machine;
@@ -128,9 +130,30 @@ impl Planner {
         (self.elapsed_s, self.cutting_s)
     }
 
-    /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken, and no
-    /// other may follow. What was pushed before comes to rest at its end after [`Planner::finish`].
+    /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken (of a
+    /// spline or a changing feed, the parts before), and no other may follow. What was pushed before comes to rest at its end after
+    /// [`Planner::finish`].
     pub fn push(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
+        if !matches!(path.contour.feed, Feed::Varying { .. }) {
+            return self.push_constant(path);
+        }
+        let stretches = varying::stretches(path, self.setpoint_period_s);
+        stretches.into_iter().try_for_each(|stretch| self.push_constant(stretch))
+    }
+
+    /// A piece whose F is the same all along.
+    fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
+        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_)));
+        // A length that is no number is refused as it is.
+        if !polynomial || !path.length_lu().is_finite() {
+            return self.push_part(Part { path, worst: None });
+        }
+        let rules = self.rules.of(&path.contour.modes);
+        split::parts(&rules, path).into_iter().try_for_each(|part| self.push_part(part))
+    }
+
+    fn push_part(&mut self, part: Part) -> Result<(), Box<Diagnostic>> {
+        let Part { path, worst } = part;
         let contour = &path.contour;
         let mut rests_after = contour.stop_at_end;
         let mut corner = FREE;
@@ -146,10 +169,11 @@ impl Planner {
                     .last
                     .as_ref()
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
-                let limits = rules.piece(contour, curve, &ends);
+                let limits = rules.piece(contour, curve, &ends, worst.as_ref());
                 check_motion(&limits, length_lu, &path)?;
                 self.last = Some((ends, rules));
-                Motion::Moves { limits, length_lu, block_length_lu: (!blend).then_some(length_lu) }
+                let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
+                Motion::Moves { limits, length_lu, block_length_lu }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
                 check_time(*time_s, &path)?;

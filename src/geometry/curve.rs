@@ -1,13 +1,13 @@
 //! One curve of the contour, whatever its shape.
 //!
-//! In: a [`Line`], [`Arc`] or [`HermiteBlend`]. Out: position and derivatives at any arc length, exact ends, parts of it.
+//! In: a [`Line`], [`Arc`], [`SpatialArc`], [`PolynomialCurve`] or [`HermiteBlend`]. Out: position and derivatives at any arc length, exact ends, parts of it.
 //!
 //! The parameter s is the arc length of the linear axes in mm; rotary axes are functions of the same s and do not count. Where no
 //! linear axis moves, s is sqrt(sum of squares) of the rotary travel in rad ([`Curve::rotary_only`]).
 //!
 //! Does not hold the block, the feed or the neighbours of a curve: that is the contour's.
 
-use super::{Arc, HermiteBlend, Line};
+use super::{Arc, HermiteBlend, Line, PolynomialCurve, SpatialArc};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 
 /// Motion shorter than this is none: a picometre, far below the resolution of any control (1 nm to 1 µm) and far above the
@@ -23,6 +23,10 @@ pub enum Curve {
     Line(Line),
     /// Circle or helix.
     Arc(Arc),
+    /// Circle or helix in a plane that no two axes span.
+    SpatialArc(SpatialArc),
+    /// Spline or polynomial.
+    Polynomial(PolynomialCurve),
     /// Corner blend.
     Blend(HermiteBlend),
 }
@@ -46,6 +50,8 @@ impl Curve {
         match self {
             Self::Line(line) => line.length_lu(),
             Self::Arc(arc) => arc.length_lu(),
+            Self::SpatialArc(arc) => arc.length_lu(),
+            Self::Polynomial(curve) => curve.length_lu(),
             Self::Blend(blend) => blend.length_lu(),
         }
     }
@@ -55,6 +61,8 @@ impl Curve {
         match self {
             Self::Line(line) => line.rotary_only(),
             Self::Arc(arc) => arc.rotary_only(),
+            Self::SpatialArc(arc) => arc.rotary_only(),
+            Self::Polynomial(curve) => curve.rotary_only(),
             Self::Blend(_) => false,
         }
     }
@@ -64,6 +72,8 @@ impl Curve {
         match self {
             Self::Line(line) => line.start(),
             Self::Arc(arc) => arc.start(),
+            Self::SpatialArc(arc) => arc.start(),
+            Self::Polynomial(curve) => curve.start(),
             Self::Blend(blend) => blend.start(),
         }
     }
@@ -73,6 +83,8 @@ impl Curve {
         match self {
             Self::Line(line) => line.end(),
             Self::Arc(arc) => arc.end(),
+            Self::SpatialArc(arc) => arc.end(),
+            Self::Polynomial(curve) => curve.end(),
             Self::Blend(blend) => blend.end(),
         }
     }
@@ -82,6 +94,8 @@ impl Curve {
         match self {
             Self::Line(line) => line.at(s_lu),
             Self::Arc(arc) => arc.at(s_lu),
+            Self::SpatialArc(arc) => arc.at(s_lu),
+            Self::Polynomial(curve) => curve.at(s_lu),
             Self::Blend(blend) => blend.at(s_lu),
         }
     }
@@ -98,6 +112,8 @@ impl Curve {
         match self {
             Self::Line(line) => Self::Line(line.shortened(start_lu, length_lu - end_lu)),
             Self::Arc(arc) => Self::Arc(arc.trimmed(start_lu, end_lu)),
+            Self::SpatialArc(arc) => Self::SpatialArc(arc.trimmed(start_lu, end_lu)),
+            Self::Polynomial(curve) => Self::Polynomial(curve.trimmed(start_lu, end_lu)),
             Self::Blend(blend) => Self::Blend(blend.trimmed(start_lu, end_lu)),
         }
     }

@@ -3,12 +3,18 @@
 //! In: points and shapes. Out: [`Curve`]. Does not know speed or axes' limits.
 
 mod arc;
+mod arc_length;
 mod blend;
 mod curve;
 mod line;
+mod polynomial;
 mod quadrature;
+mod rational;
+mod spatial_arc;
 
 pub use arc::Arc;
 pub use blend::{BlendPoint, HermiteBlend};
 pub use curve::{Curve, CurveState, DISPLACEMENT_MIN_LU};
 pub use line::Line;
+pub use polynomial::PolynomialCurve;
+pub use spatial_arc::SpatialArc;

@@ -234,6 +234,7 @@ impl Interpolator {
                 rotary_only: active.rotary_only,
             },
             feedforward_active: contour.modes.feedforward_active,
+            tool_length: contour.modes.tool.as_ref().map_or(AxisVector::zero(), |tool| tool.length),
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! In: nothing (plain data). Out: [`Setpoint`] and its parts. Does not sample.
 
-use crate::base::{PerAxis, Tick};
+use crate::base::{AxisVector, PerAxis, Tick};
 use crate::feed::Limit;
 use crate::program::BlockRef;
 
@@ -30,6 +30,8 @@ pub struct Setpoint {
     pub path: PathSample,
     /// FFWON in force.
     pub feedforward_active: bool,
+    /// Length of the active tool: position of the axes minus position of the tip.
+    pub tool_length: AxisVector,
 }
 
 /// State of the path at a set-point: the topic `/path`.

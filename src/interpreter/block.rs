@@ -4,6 +4,7 @@
 //! (assignments, G functions), then F, frame, T and M6, motion with the other outputs, and last M0, M1, M2, M17 or M30.
 
 use super::evaluate::{evaluate, integers, number};
+use super::frame_words::FrameRequest;
 use super::modal::Motion;
 use super::motion::{AxisWord, MotionWords};
 use super::path_words::CornerWords;
@@ -13,7 +14,7 @@ use super::value::Value;
 use super::wire::{Event, Move, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
-use crate::program::words::{FrameWord, GFunction, IndexedAddress, Keyword, Procedure};
+use crate::program::words::{GFunction, IndexedAddress, Keyword, Procedure, Suppression};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 use std::sync::Arc;
 
@@ -22,10 +23,6 @@ const TOOL_CHANGE: u32 = 6;
 /// M0, M1: stop. M2, M17, M30: end. They come after the motion of their block.
 const STOPS: [u32; 5] = [0, 1, 2, 17, 30];
 const ENDS: [u32; 3] = [2, 17, 30];
-/// T0: no tool.
-const NO_TOOL: &str = "0";
-/// D0: no length and no radius, whatever the tool.
-const NO_EDGE: u32 = 0;
 /// Most circles that TURN adds.
 const TURNS_MAX: u32 = 999;
 /// Smallest F of the control, in the unit of F.
@@ -46,15 +43,19 @@ pub(super) struct Collected {
     pub block_feed: Option<(Typed, Columns)>,
     /// POS, POSA.
     pub positions: PositionWords,
-    pub frame: Option<(FrameWord, Columns)>,
+    pub frame: FrameRequest,
     dwell: Option<Columns>,
     /// RND, CHF, CHR, FRC.
     pub corner: CornerWords,
     /// Output with the motion.
     pub events: Vec<Event>,
     /// T and M6: output before the motion where the block has an M6.
-    tool_events: Vec<Event>,
-    tool_change: bool,
+    pub tool_events: Vec<Event>,
+    pub tool_change: bool,
+    /// T changes the tool without M6.
+    pub tool_loads: bool,
+    /// D.
+    pub edge: Option<(u32, Columns)>,
     /// M0, M1, M2, M17, M30.
     last: Vec<Event>,
     ends: bool,
@@ -72,10 +73,9 @@ impl Interpreter {
         if let Some(columns) = block.dwell.take() {
             self.dwell(&mut block, &columns)?;
         } else {
+            // Before S: with G25 and G26 it is a limit.
+            self.frame_request(&mut block)?;
             self.take_feed(&mut block)?;
-            if let Some((frame, columns)) = block.frame.take() {
-                self.frame(frame, &mut block, &columns)?;
-            }
             self.act(&mut block)?;
         }
         if block.stops {
@@ -85,17 +85,14 @@ impl Interpreter {
             self.emit_function(block.last, true);
         }
         if block.ends {
-            self.end();
+            self.end()?;
         }
         Ok(())
     }
 
     fn act(&mut self, block: &mut Collected) -> Outcome<()> {
         let mut events = std::mem::take(&mut block.events);
-        if block.tool_change {
-            let tool_events = std::mem::take(&mut block.tool_events);
-            self.emit_function(tool_events, true);
-        }
+        self.tool_words(block, &mut events)?;
         self.start_positions(block)?;
         if !block.motion.any() && block.corner.has_shape() {
             let columns = block.corner.columns();
@@ -229,14 +226,14 @@ impl Interpreter {
             GFunction::Dwell => block.dwell = Some(columns.clone()),
             GFunction::ExactStopOnce => block.motion.exact_stop = true,
             GFunction::Plane(plane) => self.modal.plane = plane,
-            GFunction::SuppressFrames(_) => block.motion.suppress_frames = true,
+            GFunction::SuppressFrames(which) => block.motion.suppress(which),
             GFunction::AxialOffset(coarse) => self.axial_offset(coarse, columns, block)?,
             GFunction::Pole(origin) => self.pole(origin, columns, block)?,
             GFunction::Limit(upper) => self.limit(upper, columns, block)?,
             GFunction::ExactStopWindow(window) => self.modal.exact_stop = window,
             GFunction::FeedType(feed_type) => self.feed_type(feed_type, columns)?,
-            // All zero offsets are 0.
-            GFunction::ZeroOffset(_) | GFunction::Silent(_) => {}
+            GFunction::ZeroOffset(number) => self.zero_offset(number),
+            GFunction::Silent(_) => {}
             GFunction::PathMode(mode) => self.modal.path_mode = mode,
             GFunction::Measure(measure) => self.modal.measure = measure,
             GFunction::Absolute(absolute) => self.modal.absolute = absolute,
@@ -261,10 +258,9 @@ impl Interpreter {
             Keyword::Compressor(compressor) => self.modal.compressor = compressor,
             Keyword::FeedforwardOn => self.modal.feedforward_active = true,
             Keyword::FeedforwardOff => self.modal.feedforward_active = false,
-            Keyword::SuppressFrames => block.motion.suppress_frames = true,
-            Keyword::Frame(word) => block.frame = Some((word, columns.clone())),
+            Keyword::SuppressFrames => block.motion.suppress(Suppression::All),
+            Keyword::Frame(word) => return self.frame_word(word, columns, block),
             Keyword::StopPreparation => block.stops = true,
-            Keyword::Return => block.ends = true,
         }
         Ok(())
     }
@@ -285,9 +281,7 @@ impl Interpreter {
         }
         if address == Address::Tool {
             let name = self.tool(value)?;
-            if &*name != NO_TOOL {
-                self.report_tool("tool", &name, columns);
-            }
+            block.tool_loads |= self.select_tool(&name, columns)?;
             let tool = Event::Tool(name);
             block.tool_events.push(tool.clone());
             block.events.push(tool);
@@ -325,9 +319,7 @@ impl Interpreter {
             }
             Address::Edge => {
                 let edge = whole(typed, columns, "D")?;
-                if edge != NO_EDGE {
-                    self.report_tool("edge", &format!("D{edge}"), columns);
-                }
+                block.edge = Some((edge, columns.clone()));
                 block.events.push(Event::Edge(edge));
             }
             Address::M => {
@@ -387,20 +379,9 @@ impl Interpreter {
         })
     }
 
-    /// There is no tool table: reports the first tool or edge that is selected, once a run.
-    fn report_tool(&mut self, what: &str, name: &str, columns: &Columns) {
-        if self.first_report(codes::NO_TOOL_DATA) {
-            let message = format!("{what} `{name}` has no data: length and radius of every tool count as 0");
-            let fault = Fault::new(codes::NO_TOOL_DATA, columns.clone(), message)
-                .label("no data")
-                .help("positions are those of a tool tip without length; further tools are not reported");
-            self.warn(*fault);
-        }
-    }
-
     /// G4 F (seconds) or G4 S (revolutions): F and S of the path stay as they are.
     fn dwell(&mut self, block: &mut Collected, columns: &Columns) -> Outcome<()> {
-        if block.motion.any() || block.frame.is_some() {
+        if block.motion.any() || block.frame.any() {
             return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), "G4 with a motion or a frame in one block")
                 .label("expected a block of its own"));
         }
@@ -410,6 +391,7 @@ impl Interpreter {
                 .label(format!("expected 0 to {DWELL_MAX_S} s")));
         }
         let mut events = std::mem::take(&mut block.events);
+        self.change_and_apply(block)?;
         if block.tool_change {
             events.splice(0..0, block.tool_events.drain(..));
         }
@@ -440,6 +422,14 @@ impl Interpreter {
         let modes = &self.modal.feed_modes;
         let cutting_rpm = if modes.cutting { self.cutting_rpm_here() } else { None };
         cutting_rpm.unwrap_or_else(|| modes.limited_rpm(self.modal.spindle_speed_rpm))
+    }
+}
+
+impl Collected {
+    /// Takes the S word out of the block: it limits the spindle and is no speed.
+    pub fn take_spindle_speed(&mut self) -> Option<(f64, Columns)> {
+        self.events.retain(|event| !matches!(event, Event::SpindleSpeed { .. }));
+        self.spindle_speed_rpm.take()
     }
 }
 

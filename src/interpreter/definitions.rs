@@ -5,7 +5,7 @@
 
 use super::run::Interpreter;
 use crate::program::syntax::{Address, ExprKind, Statement, Word, WordKind};
-use crate::program::{Fault, Outcome, ProgramSource, codes, parse};
+use crate::program::{Fault, Outcome, ProgramSource, Window, codes, parse};
 
 /// What ends a definition file.
 const ENDS: [i32; 3] = [2, 17, 30];
@@ -36,10 +36,11 @@ impl Interpreter {
 
     fn definition_file(&mut self, file: &ProgramSource) -> Outcome<()> {
         let mut cursor = file.first();
-        while let Some((bytes, next)) = file.line_bytes(cursor) {
+        let mut window = Window::default();
+        while let Some((bytes, next)) = file.line(&mut window, cursor)? {
             self.current = cursor;
             cursor = next;
-            let text = file.decode(bytes).into_owned();
+            let text = file.decode(&bytes).into_owned();
             match parse(&text, &self.dialect)?.statement {
                 Statement::Define(definition) => self.define(&definition)?,
                 Statement::Words(words) if words.iter().all(is_end) => {}

@@ -60,6 +60,9 @@ fn variable(name: &Arc<str>, indices: &[Expr], context: &Interpreter, columns: &
     {
         return Ok(Value::Axis(Some(axis)));
     }
+    if let Some(dimensions) = context.variables.frame_dimensions(name) {
+        return context.user_frame(name, dimensions, indices, columns);
+    }
     let indices = integers(indices, context)?;
     context.variables.get(name, &indices, columns)
 }
@@ -169,7 +172,10 @@ fn divide(
 }
 
 /// `:` joins frames.
-fn chain(_left: &Value, _right: &Value, columns: &Columns) -> Outcome<Value> {
+fn chain(left: &Value, right: &Value, columns: &Columns) -> Outcome<Value> {
+    if let (Value::Frame(outer), Value::Frame(inner)) = (left, right) {
+        return Ok(Value::Frame(Arc::new(outer.chained(inner))));
+    }
     Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "`:` chains frames").label("expected frames on both sides"))
 }
 

@@ -1,4 +1,4 @@
-//! Control flow: IF, loops, jumps, DEF.
+//! Control flow: IF, loops, CASE, DEF. Jumps are in `jump`, calls in `call`.
 //!
 //! In: a statement. Out: the next line, variables. Loops keep nothing but their variables: a jump out of a loop or into it leaves
 //! nothing behind. Partners and labels come from the program's [`crate::program::structure::Structure`].
@@ -6,18 +6,31 @@
 use super::evaluate::{evaluate, integers, number};
 use super::run::Interpreter;
 use super::value::Value;
-use crate::base::diagnostics::nearest;
-use crate::program::structure::number_of;
-use crate::program::syntax::{
-    Case, Definition, Destination, Direction, Expr, ForLoop, Initial, Jump, Statement, Target,
-};
-use crate::program::{Columns, Cursor, Fault, Outcome, block_number, codes, parse};
+use crate::program::syntax::{Case, Definition, Expr, ForLoop, Initial, Statement, Target};
+use crate::program::{Columns, Cursor, Fault, Outcome, codes, is_synchronised};
 use std::cmp::Ordering;
 
-/// Answers kept of searches for block numbers: computed targets may be without number.
-const FOUND_NUMBERS_MAX: usize = 4096;
-/// Lines that are searched in the time that a block takes.
-const SEARCHED_LINES_PER_BLOCK: u32 = 64;
+/// A part of a program that is executed several times, or apart from the rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Repeat {
+    /// Its first line.
+    pub first: Cursor,
+    /// The line behind its last one.
+    pub behind: Cursor,
+    /// This pass included.
+    pub passes_left: i32,
+    /// What comes after the last pass.
+    pub then: Passed,
+}
+
+/// What comes after a repeated part.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Passed {
+    /// This line.
+    GoOn(Cursor),
+    /// The end of the program.
+    Leave,
+}
 
 impl Interpreter {
     /// Executes a statement.
@@ -28,45 +41,68 @@ impl Interpreter {
             Statement::If(condition) => {
                 let partner = self.partner()?;
                 if !self.truth(condition)? {
-                    self.go_behind(partner);
+                    self.go_behind(partner)?;
                 }
                 Ok(())
             }
-            Statement::IfJump(condition, jump) => {
-                if self.truth(condition)? {
-                    self.jump(jump)?;
+            Statement::IfJump(branches) => {
+                for (condition, jump) in branches {
+                    if self.truth(condition)? {
+                        return self.jump(jump);
+                    }
                 }
                 Ok(())
             }
             // The branch before ELSE has been executed.
-            Statement::Else => self.partner().map(|end| self.go_behind(end)),
+            Statement::Else => self.partner().and_then(|end| self.go_behind(end)),
             Statement::EndIf => self.partner().map(|_| ()),
             Statement::For(for_loop) => self.enter_for(for_loop),
             Statement::EndFor => self.next_pass(),
             Statement::While(condition) => {
                 let end = self.partner()?;
                 if !self.truth(condition)? {
-                    self.go_behind(end);
+                    self.go_behind(end)?;
                 }
                 Ok(())
             }
             Statement::EndWhile => self.partner().map(|start| self.next = start),
             Statement::Loop | Statement::Repeat => self.partner().map(|_| ()),
-            Statement::EndLoop => self.partner().map(|start| self.go_behind(start)),
+            Statement::EndLoop => self.partner().and_then(|start| self.go_behind(start)),
             Statement::Until(condition) => {
                 let start = self.partner()?;
                 if !self.truth(condition)? {
-                    self.go_behind(start);
+                    self.go_behind(start)?;
                 }
                 Ok(())
             }
             Statement::Jump(jump) => self.jump(jump),
             Statement::Case(case) => self.case(case),
+            Statement::RepeatBlocks(wanted) => self.repeat_blocks(wanted),
+            // Its parameters were defined by the call.
+            Statement::Procedure(_) => Ok(()),
+            Statement::External(header) => self.external(header),
+            Statement::Call(call) => self.call(call),
+            Statement::ModalCall(call) => self.modal_call(call.as_deref()),
+            Statement::CallPath(path) => self.set_call_path(path.as_ref()),
+            Statement::Return(wanted) => self.return_from(wanted),
+            // MCALL of a cycle that is not made, or a synchronised action.
             Statement::NotActedOn(entry, columns) => {
+                if !is_synchronised(entry.word) {
+                    self.modal_call = None;
+                }
                 self.report_word(entry, columns);
                 Ok(())
             }
         }
+    }
+
+    fn set_call_path(&mut self, path: Option<&Expr>) -> Outcome<()> {
+        let path = match path {
+            Some(path) => Some(self.text_of(&evaluate(path, self)?, &path.columns)?.to_string()),
+            None => None,
+        };
+        self.library.set_call_path(path);
+        Ok(())
     }
 
     fn truth(&self, condition: &Expr) -> Outcome<bool> {
@@ -76,7 +112,7 @@ impl Interpreter {
     /// Line of the partner of the control word in this line.
     fn partner(&self) -> Outcome<Cursor> {
         let line = self.current.line;
-        let structure = self.source.structure();
+        let structure = self.source.structure()?;
         structure.partner(line).filter(|_| structure.unmatched(line).is_none()).ok_or_else(|| {
             let end = self.source.line_text(self.current).trim_end().len() as u32;
             match structure.unmatched(line) {
@@ -87,8 +123,10 @@ impl Interpreter {
     }
 
     /// Goes on behind a line.
-    fn go_behind(&mut self, cursor: Cursor) {
-        self.next = self.source.line_bytes(cursor).map_or(cursor, |(_, next)| next);
+    pub(super) fn go_behind(&mut self, cursor: Cursor) -> Outcome<()> {
+        let line = self.source.line(&mut self.window, cursor)?;
+        self.next = line.map_or(cursor, |(_, next)| next);
+        Ok(())
     }
 
     fn enter_for(&mut self, for_loop: &ForLoop) -> Outcome<()> {
@@ -96,7 +134,7 @@ impl Interpreter {
         let first = evaluate(&for_loop.first, self)?;
         self.assign(&for_loop.counter, &first, &for_loop.counter_columns, &for_loop.first.columns)?;
         if self.counter_is_past(for_loop)? {
-            self.go_behind(end);
+            self.go_behind(end)?;
         }
         Ok(())
     }
@@ -104,7 +142,7 @@ impl Interpreter {
     /// ENDFOR: counts up and goes back, unless the last value is passed.
     fn next_pass(&mut self) -> Outcome<()> {
         let start = self.partner()?;
-        let Ok(block) = parse(&self.source.line_text(start), &self.dialect) else { return Ok(()) };
+        let block = self.block_at(start)?;
         let Statement::For(for_loop) = &block.statement else { return Ok(()) };
         let counted = match self.read(&for_loop.counter, &for_loop.counter_columns)? {
             Value::Int(value) if value < i32::MAX => Value::Int(value + 1),
@@ -112,7 +150,7 @@ impl Interpreter {
         };
         self.assign(&for_loop.counter, &counted, &for_loop.counter_columns, &for_loop.counter_columns)?;
         if !self.counter_is_past(for_loop)? {
-            self.go_behind(start);
+            self.go_behind(start)?;
         }
         Ok(())
     }
@@ -131,94 +169,6 @@ impl Interpreter {
             }
         }
         case.default.as_ref().map_or(Ok(()), |jump| self.jump(jump))
-    }
-
-    fn jump(&mut self, jump: &Jump) -> Outcome<()> {
-        let Some(destination) = &jump.destination else {
-            self.next = self.source.first();
-            return Ok(());
-        };
-        let (name, number) = match destination {
-            Destination::Number(number) => (format!("N{number}"), Some(*number)),
-            Destination::Name(name) => {
-                self.computed(self.variables.text(name).unwrap_or_else(|| name.clone()).as_ref())
-            }
-            Destination::Text(text) => self.computed(&self.text_of(&evaluate(text, self)?, &text.columns)?),
-        };
-        let found = match number {
-            Some(number) => self.find_number(number, jump.direction),
-            None => self.source.structure().label(&name, self.current.line, jump.direction),
-        };
-        match found {
-            Some(cursor) => self.next = cursor,
-            None if jump.direction == Direction::BothQuiet => {}
-            None => return Err(self.no_target(&name, jump)),
-        }
-        Ok(())
-    }
-
-    /// A text as a destination: `N90` is a block number, anything else a label.
-    fn computed(&self, text: &str) -> (String, Option<u64>) {
-        let name = text.trim().trim_end_matches(':').to_ascii_uppercase();
-        let number = block_number(&name);
-        (name, number)
-    }
-
-    fn no_target(&self, name: &str, jump: &Jump) -> Box<Fault> {
-        let structure = self.source.structure();
-        let towards = match jump.direction {
-            Direction::Forward => " towards the end of the program",
-            Direction::Backward => " towards the start of the program",
-            _ => "",
-        };
-        let help = if structure.label(name, self.current.line, Direction::Both).is_some() {
-            Some("it stands in the other direction: GOTO searches both ways".to_owned())
-        } else {
-            nearest(name, structure.label_names()).map(|near| format!("did you mean `{near}`?"))
-        };
-        Fault::new(codes::NO_TARGET, jump.columns.clone(), format!("there is no `{name}`{towards}"))
-            .label("jump destination not found")
-            .maybe_help(help)
-    }
-
-    /// Searches a block number as the control does, and remembers the answer.
-    fn find_number(&mut self, number: u64, direction: Direction) -> Option<Cursor> {
-        let key = (self.current.line, direction, number);
-        if let Some(known) = self.found_numbers.get(&key) {
-            return *known;
-        }
-        let following = self.next;
-        let found = match direction {
-            Direction::Forward => self.search_number(number, following, u32::MAX, true),
-            Direction::Backward => self.search_number(number, self.source.first(), self.current.line, false),
-            _ => {
-                let forward = self.search_number(number, following, u32::MAX, true);
-                forward.or_else(|| self.search_number(number, self.source.first(), self.current.line, true))
-            }
-        };
-        if self.found_numbers.len() < FOUND_NUMBERS_MAX {
-            self.found_numbers.insert(key, found);
-        }
-        found
-    }
-
-    /// First or last line with the block number, from `cursor` up to and including `last_line`.
-    fn search_number(&mut self, number: u64, mut cursor: Cursor, last_line: u32, first: bool) -> Option<Cursor> {
-        let mut found = None;
-        let mut lines = 0;
-        while let Some((line, next)) = self.source.line_bytes(cursor).filter(|_| cursor.line <= last_line) {
-            lines += 1;
-            if number_of(line) == Some(number) {
-                found = Some(cursor);
-                if first {
-                    break;
-                }
-            }
-            cursor = next;
-        }
-        // Searching takes time too: a loop that searches without end must be found out.
-        self.idle_blocks = self.idle_blocks.saturating_add(lines / SEARCHED_LINES_PER_BLOCK);
-        found
     }
 
     pub(super) fn define(&mut self, definition: &Definition) -> Outcome<()> {
@@ -303,6 +253,10 @@ impl Interpreter {
                 self.variables.set_parameter(number, value.number(value_columns)?, &index.columns)
             }
             Target::Variable { name, indices } => {
+                if let Some(dimensions) = self.variables.frame_dimensions(name) {
+                    let columns = (target_columns, value_columns);
+                    return self.set_user_frame(name, dimensions, indices, value, columns);
+                }
                 let indices = integers(indices, self)?;
                 self.variables.set(name, &indices, value, (target_columns, value_columns))
             }

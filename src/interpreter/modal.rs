@@ -2,12 +2,13 @@
 //!
 //! In: words, as `block` hands them over. Out: factors and modes for the motion of a block. No positions here.
 
+use super::active_frames::ActiveFrames;
 use super::feed_state::FeedModes;
 use super::path_words::ModalCorner;
 use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
+use crate::base::AxisKind;
 use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
-use crate::base::{AxisKind, AxisVector};
 use crate::machine::{AccelerationMode, DynamicsMode, FeedSettings, PathMode};
 use crate::program::syntax::Typed;
 use crate::program::words::{Measure, Plane};
@@ -76,13 +77,13 @@ pub struct Modal {
     pub feed_modes: FeedModes,
     /// S; 0 before the first.
     pub spindle_speed_rpm: f64,
-    /// TRANS and ATRANS.
-    pub translation_lu: AxisVector,
+    /// Basic, settable and programmable frame.
+    pub frames: Arc<ActiveFrames>,
 }
 
 impl Modal {
     /// State at program start: G1 G17 G90 G94 G71, and what the machine file says.
-    pub fn new(settings: &FeedSettings) -> Self {
+    pub fn new(settings: &FeedSettings, frames: ActiveFrames) -> Self {
         Self {
             motion: Motion::Line,
             plane: Plane::G17,
@@ -103,8 +104,21 @@ impl Modal {
             feed: None,
             feed_modes: FeedModes::default(),
             spindle_speed_rpm: 0.0,
-            translation_lu: AxisVector::zero(),
+            frames: Arc::new(frames),
         }
+    }
+
+    /// SAVE: G functions and frames of `saved` hold again; feed, spindle, tool and the other addresses stay.
+    pub fn restore(&mut self, saved: Self) {
+        let now = std::mem::replace(self, saved);
+        self.feed = now.feed;
+        self.spindle_speed_rpm = now.spindle_speed_rpm;
+        self.tool = now.tool;
+        self.programmed = now.programmed;
+        self.contour_tolerance_mm = now.contour_tolerance_mm;
+        self.rounding_distance_mm = now.rounding_distance_mm;
+        self.rapid_rounding_distance_mm = now.rapid_rounding_distance_mm;
+        self.corner = now.corner;
     }
 
     /// Modes for the wire; `exact_stop` = G9 in this block.

@@ -1,21 +1,22 @@
 //! Axis words -> end point, line, rapid or arc.
 //!
-//! In: the axis and circle words of a block, the modal state. Out: a [`super::Move`] in the basic coordinate system. Frames are
-//! translations only. Checks travel at programmed end points (a warning: the control would stop with alarm 10720).
+//! In: the axis and circle words of a block, the modal state. Out: a [`super::Move`] in the basic coordinate system; frames are
+//! `placement`'s. Checks travel at programmed end points (a warning: the control would stop with alarm 10720).
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
 use super::block::FEED_MIN;
 use super::modal::{Motion, ProgrammedFeed};
 use super::path_feed::Way;
+use super::placement::turn_outward;
 use super::run::Interpreter;
 use super::value::trimmed;
-use super::wire::{ArcGeometry, Event, MoveKind};
+use super::wire::{Event, MoveKind};
 use crate::base::units::deg_from_rad;
-use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
+use crate::base::{AxisId, AxisKind, AxisVector, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::PlainBlock;
 use crate::program::syntax::{Form, Typed};
-use crate::program::words::Plane;
+use crate::program::words::{Plane, Suppression};
 use crate::program::{Columns, Fault, NotActedOn, Outcome, codes};
 use std::f64::consts::{PI, TAU};
 
@@ -54,7 +55,7 @@ pub(super) struct MotionWords {
     /// F or FB under G93 or G931: time of the block.
     pub block_time_s: Option<f64>,
     /// SUPA, G53, G153.
-    pub suppress_frames: bool,
+    pub suppression: Option<Suppression>,
 }
 
 impl Default for MotionWords {
@@ -65,9 +66,9 @@ impl Default for MotionWords {
             radius: None,
             turns: 0,
             exact_stop: false,
+            suppression: None,
             block_feed: None,
             block_time_s: None,
-            suppress_frames: false,
         }
     }
 }
@@ -78,18 +79,31 @@ impl MotionWords {
         self.axes.as_slice().iter().any(Option::is_some) || self.has_circle_words()
     }
 
+    /// SUPA, G53, G153: the one that suppresses most holds.
+    pub fn suppress(&mut self, which: Suppression) {
+        self.suppression = self.suppression.max(Some(which));
+    }
+
     /// True with I, J, K or CR.
     pub fn has_circle_words(&self) -> bool {
         self.centre.iter().any(Option::is_some) || self.radius.is_some()
     }
 
     /// Columns of all words of the motion.
-    pub(super) fn columns(&self) -> Columns {
+    pub fn columns(&self) -> Columns {
         let axes =
             self.axes.as_slice().iter().flatten().chain(self.centre.iter().flatten()).map(|word| word.columns.clone());
         let all = axes.chain(self.radius.iter().map(|(_, columns)| columns.clone()));
         all.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
     }
+}
+
+/// What a plain block leaves behind in the workpiece system.
+pub(super) struct PlainWork {
+    /// Where each axis was sent last.
+    pub programmed_lu: AxisVector,
+    /// The whole position, where the frames turn.
+    pub turned_lu: Option<AxisVector>,
 }
 
 impl Interpreter {
@@ -107,11 +121,12 @@ impl Interpreter {
         let kind = match self.modal.motion {
             Motion::Rapid => MoveKind::Rapid,
             Motion::Line => MoveKind::Line,
-            Motion::Clockwise | Motion::CounterClockwise => MoveKind::Arc(self.arc(words, end)?),
+            Motion::Clockwise | Motion::CounterClockwise => self.arc(words)?,
         };
+        self.check_work_area(words, &kind, &end)?;
         self.check_travel(words, end);
-        self.note_applied(words);
         self.position = end;
+        self.note_programmed(words, start);
         if kind == MoveKind::Rapid && self.rapid_by_axis(words.exact_stop) {
             self.position = start;
             self.rapid_axes(end, named, std::mem::take(events));
@@ -136,36 +151,16 @@ impl Interpreter {
         };
         let feed_known = motion == Motion::Rapid || (motion == Motion::Line && feed.is_some());
         let straight = feed_known && self.modal.feed_modes.plain;
-        let start = self.position;
-        let mut end = start;
-        let machine = &self.machine;
-        for id in machine.axis_ids() {
-            let Some(typed) = block.axes[id] else { continue };
-            let axis = machine.axis(id);
-            let value_lu = self.modal.position_lu(axis.kind, typed);
-            let offset_lu = self.modal.translation_lu[id];
-            end.0[id] = if self.modal.absolute {
-                value_lu + offset_lu
-            } else {
-                end.0[id] + value_lu + offset_lu - self.applied_lu[id]
-            };
-            if outside(axis.travel_lu, end.0[id]).is_some() || end.0[id].abs() > LENGTH_MAX_LU {
-                return false;
-            }
-        }
         if !straight {
             return false;
         }
-        for id in machine.axis_ids() {
-            if block.axes[id].is_some() {
-                self.applied_lu[id] = self.modal.translation_lu[id];
-            }
-        }
+        let start = self.position;
+        let Some((end, work)) = self.plain_end(block) else { return false };
+        self.know_place(end, work);
         self.number += 1;
         self.modal.motion = motion;
         self.modal.feed = feed;
         if block.axes.as_slice().iter().any(Option::is_some) {
-            self.position = end;
             let kind = if motion == Motion::Rapid { MoveKind::Rapid } else { MoveKind::Line };
             let feed = self.plain_feed(start, end);
             self.emit(kind, feed, false, Vec::new());
@@ -173,69 +168,60 @@ impl Interpreter {
         true
     }
 
-    /// All axes at the end of the block.
-    pub(super) fn end_point(&self, words: &MotionWords) -> Outcome<PartPoint> {
+    /// All axes at the end of a plain block, and in the workpiece system; `None` beyond the travel.
+    fn plain_end(&mut self, block: &PlainBlock) -> Option<(PartPoint, PlainWork)> {
+        let total = self.modal.frames.total();
+        let machine = &self.machine;
         let mut end = self.position;
-        for id in self.machine.axis_ids() {
-            if let Some(word) = &words.axes[id] {
-                end.0[id] = bounded(self.axis_end(id, word, words.suppress_frames)?, &word.columns)?;
+        let mut programmed_lu = self.programmed_lu;
+        let mut turned_lu = None;
+        for id in machine.axis_ids() {
+            let Some(typed) = block.axes[id] else { continue };
+            let mut value_lu = self.modal.position_lu(machine.axis(id).kind, typed);
+            if !self.modal.absolute {
+                value_lu += self.programmed_lu[id];
+            }
+            programmed_lu[id] = value_lu;
+            match total.turning_place(id) {
+                None => end.0[id] = total.axis_outward(id, value_lu),
+                Some(_) => turned_lu.get_or_insert_with(|| self.work_position_lu(None))[id] = value_lu,
             }
         }
-        Ok(end)
-    }
-
-    fn axis_end(&self, id: AxisId, word: &AxisWord, suppress_frames: bool) -> Outcome<f64> {
-        let axis = self.machine.axis(id);
-        let value_lu = self.modal.position_lu(axis.kind, word.typed);
-        let offset_lu = if suppress_frames { 0.0 } else { self.modal.translation_lu[id] };
-        let now_lu = self.position.0[id];
-        let incremental = match word.form {
-            Form::Modal => !self.modal.absolute,
-            Form::Incremental => true,
-            Form::Absolute => false,
-            Form::Shortest | Form::Positive | Form::Negative => {
-                if !axis.modulo {
-                    return self.direct(word, value_lu + offset_lu, &axis.name);
-                }
-                return Ok(now_lu + way_round(value_lu + offset_lu - now_lu, word.form));
-            }
+        if let Some(work_lu) = &turned_lu {
+            turn_outward(total, work_lu, |id| block.axes[id].is_some(), &mut end);
+        }
+        let fits = |id: AxisId| {
+            let end_lu = end.0[id];
+            self.beyond_travel(id, &end).is_none()
+                && end_lu.abs() <= LENGTH_MAX_LU
+                && self.work_area.violated_lu(id, end_lu).is_none()
         };
-        if !incremental {
-            return Ok(value_lu + offset_lu);
-        }
-        let pending_lu = if suppress_frames { 0.0 } else { offset_lu - self.applied_lu[id] };
-        Ok(now_lu + value_lu + pending_lu)
+        let moved = |id: &AxisId| block.axes[*id].is_some() || end.0[*id] != self.position.0[*id];
+        machine.axis_ids().filter(moved).all(fits).then_some((end, PlainWork { programmed_lu, turned_lu }))
     }
 
-    /// DC of an axis with ends is its absolute position; ACP and ACN have no meaning there.
-    fn direct(&self, word: &AxisWord, end_lu: f64, name: &str) -> Outcome<f64> {
-        if word.form == Form::Shortest {
-            return Ok(end_lu);
-        }
-        Err(Fault::new(
-            codes::MODULO,
-            word.columns.clone(),
-            format!("ACP and ACN need an endless axis, and `{name}` is none"),
-        )
-        .label("expected AC or IC"))
+    /// The limit that an axis violates at `end`, and by how much.
+    fn beyond_travel(&self, id: AxisId, end: &PartPoint) -> Option<(f64, f64)> {
+        outside(self.machine.axis(id).travel_lu, self.machine_end_lu(id, end))
     }
 
-    pub(super) fn note_applied(&mut self, words: &MotionWords) {
-        let suppressed = words.suppress_frames;
-        for id in self.machine.clone().axis_ids() {
-            let Some(word) = &words.axes[id] else { continue };
-            let incremental = word.form == Form::Incremental || (word.form == Form::Modal && !self.modal.absolute);
-            if !(suppressed && incremental) {
-                self.applied_lu[id] = self.modal.translation_lu[id];
-            }
-        }
+    /// Position of a machine axis when the tool tip is at `end`.
+    fn machine_end_lu(&self, id: AxisId, end: &PartPoint) -> f64 {
+        end.0[id] + self.modal.tool.as_ref().map_or(0.0, |tool| tool.length[id])
     }
 
-    fn arc(&mut self, words: &MotionWords, end: PartPoint) -> Outcome<ArcGeometry> {
+    /// A circle, calculated in the workpiece system and placed by the frames.
+    fn arc(&mut self, words: &MotionWords) -> Outcome<MoveKind> {
         let columns = words.columns();
         let (indices, plane) = self.plane(&columns)?;
-        let start_mm = plane.map(|id| self.position.0[id]);
-        let end_mm = plane.map(|id| end.0[id]);
+        let start_lu = self.work_position_lu(words.suppression);
+        let start_mm = plane.map(|id| start_lu[id]);
+        let mut end_mm = start_mm;
+        for (end_mm, id) in end_mm.iter_mut().zip(plane) {
+            if let Some(word) = &words.axes[id] {
+                *end_mm = bounded(self.axis_target_lu(id, word, words.suppression)?, &word.columns)?;
+            }
+        }
         let across = 3 - indices[0] - indices[1];
         if let Some(word) = words.centre[across].as_ref().filter(|word| word.typed.0 != 0.0)
             && let Some(entry) = NotActedOn::find("I/J/K")
@@ -254,9 +240,7 @@ impl Interpreter {
             },
             None if has_centre => {
                 let centre = |k: usize| match in_plane[k] {
-                    Some(word) => {
-                        bounded(self.centre(word, plane[k], start_mm[k], words.suppress_frames), &word.columns)
-                    }
+                    Some(word) => bounded(self.centre_mm(word, start_mm[k]), &word.columns),
                     None => Ok(start_mm[k]),
                 };
                 ArcShape::Centre { centre_mm: [centre(0)?, centre(1)?] }
@@ -273,16 +257,14 @@ impl Interpreter {
         };
         let counter_clockwise = self.modal.motion == Motion::CounterClockwise;
         let arc = ProgrammedArc { plane, start_mm, end_mm, shape, counter_clockwise, extra_turns: words.turns };
-        arc_geometry(&arc, &columns)
+        let placed = arc_geometry(&arc, &columns)?;
+        self.placed_arc(placed, &start_lu, words.suppression, &columns)
     }
 
     /// I, J, K count from the start of the arc, whatever G90 says; AC() makes them positions.
-    fn centre(&self, word: &AxisWord, axis: AxisId, start_mm: f64, suppress_frames: bool) -> f64 {
+    fn centre_mm(&self, word: &AxisWord, start_mm: f64) -> f64 {
         let typed_mm = self.modal.position_lu(AxisKind::Linear, word.typed);
-        if word.form == Form::Absolute {
-            return typed_mm + if suppress_frames { 0.0 } else { self.modal.translation_lu[axis] };
-        }
-        start_mm + typed_mm
+        if word.form == Form::Absolute { typed_mm } else { start_mm + typed_mm }
     }
 
     /// The axes of the working plane: their places among X, Y, Z, and the axes.
@@ -308,8 +290,13 @@ impl Interpreter {
         let machine = self.machine.clone();
         for id in machine.axis_ids() {
             let axis = machine.axis(id);
-            let Some(word) = &words.axes[id] else { continue };
-            let Some((limit_lu, beyond_lu)) = outside(axis.travel_lu, end.0[id]) else { continue };
+            // Frames that turn also move axes without a word.
+            let columns = match &words.axes[id] {
+                Some(word) => word.columns.clone(),
+                None if end.0[id] != self.position.0[id] => words.columns(),
+                None => continue,
+            };
+            let Some((limit_lu, beyond_lu)) = self.beyond_travel(id, &end) else { continue };
             if self.travel_warned[id] {
                 continue;
             }
@@ -319,10 +306,11 @@ impl Interpreter {
                 AxisKind::Rotary => (deg_from_rad, "deg"),
             };
             let name = &axis.name;
-            let (end, limit, beyond) = (trimmed(shown(end.0[id])), trimmed(shown(limit_lu)), trimmed(shown(beyond_lu)));
+            let (end, limit, beyond) =
+                (trimmed(shown(self.machine_end_lu(id, &end))), trimmed(shown(limit_lu)), trimmed(shown(beyond_lu)));
             let message =
                 format!("{name} goes to {end} {unit}, {beyond} {unit} beyond its travel limit of {limit} {unit}");
-            let fault = Fault::new(codes::TRAVEL, word.columns.clone(), message)
+            let fault = Fault::new(codes::TRAVEL, columns, message)
                 .label("outside the travel")
                 .help("the control would raise alarm 10720; the simulation goes on, and further positions of this axis are not reported");
             self.warn(*fault);
@@ -331,7 +319,7 @@ impl Interpreter {
 }
 
 /// A length or angle that can be calculated with.
-fn bounded(value_lu: f64, columns: &Columns) -> Outcome<f64> {
+pub(super) fn bounded(value_lu: f64, columns: &Columns) -> Outcome<f64> {
     if value_lu.abs() <= LENGTH_MAX_LU {
         return Ok(value_lu);
     }
@@ -349,7 +337,7 @@ fn outside(travel_lu: Option<[f64; 2]>, position_lu: f64) -> Option<(f64, f64)> 
 }
 
 /// Way of an endless axis to a position `difference_rad` away.
-fn way_round(difference_rad: f64, form: Form) -> f64 {
+pub(super) fn way_round(difference_rad: f64, form: Form) -> f64 {
     let mut forward_rad = difference_rad.rem_euclid(TAU);
     if forward_rad < SAME_ANGLE_RAD || TAU - forward_rad < SAME_ANGLE_RAD {
         forward_rad = 0.0;

@@ -135,7 +135,8 @@ impl Interpreter {
         let (Some(first_rpm), Some(last_rpm)) = (speed(0.0), speed(1.0)) else {
             return Err(stands("F counts revolutions, and no spindle speed is programmed", "write S before it"));
         };
-        if first_rpm == last_rpm && matches!(way.kind, MoveKind::Line) {
+        // From one side of the axis of rotation to the other the speed is not that of the ends.
+        if first_rpm == last_rpm && speed(0.5) == Some(first_rpm) && matches!(way.kind, MoveKind::Line) {
             return Ok(Feed::Path { feed_lu_s: feed * first_rpm });
         }
         Ok(varying(|share| feed * speed(share).unwrap_or(first_rpm)))

@@ -194,7 +194,7 @@ impl Interpreter {
         let linear = |id: &AxisId| self.machine.axis(*id).kind == AxisKind::Linear;
         let [Some(first), Some(second)] = indices.map(|index| self.geometry[index].filter(linear)) else { return None };
         let feed_mm_s = words.feed_mm_s.unwrap_or(self.modal.corner.feed_mm_s);
-        moves.then(|| Box::new(CornerInsert { shape, plane: [first, second], feed_mm_s }))
+        moves.then(|| Box::new(CornerInsert { shape, plane: [first, second], directions: None, feed_mm_s }))
     }
 
     /// A length that may be 0.

@@ -6,7 +6,8 @@
 //!
 //! * Without FA an axis goes as fast as it can (the control: MD32060, which the machine file does not have). Its jerk is limited
 //!   unless BRISKA or DRIVEA says otherwise. Its acceleration is that of DYNNORM with ACC.
-//! * RTLIOF acts only where the control lets it: G60 or G9, and no compressor. Every axis of the rapid then takes its own time.
+//! * An axis of the transformation of a five-axis machine cannot move on its own: an error, because the others would jump.
+//! * RTLIOF acts only where the control lets it: G60 or G9, no compressor and no transformation. Every axis of the rapid then takes its own time.
 //!
 //! Does not know how long a motion takes: that is feed's.
 
@@ -15,7 +16,7 @@ use super::motion::{AxisWord, MotionWords};
 use super::run::Interpreter;
 use super::wire::{AxisPositioning, Compressor, Event, Feed, MoveKind};
 use crate::base::{AxisId, PartPoint, PerAxis};
-use crate::machine::PathMode;
+use crate::machine::{KinematicsSettings, PathMode};
 use crate::program::syntax::{AddressValue, Typed};
 use crate::program::{Columns, Fault, Outcome, codes};
 
@@ -42,6 +43,15 @@ impl Interpreter {
             return Err(Fault::new(codes::TWICE, columns.clone(), "this axis is positioned twice in the block")
                 .label("programmed again"));
         }
+        if self.in_transformation(axis) {
+            let name = &self.machine.axis(axis).name;
+            let message = format!("{name} belongs to the transformation of the machine and cannot move on its own");
+            return Err(Fault::new(codes::BAD_BLOCK, columns.clone(), message)
+                .label("the other axes would have to jump")
+                .help(format!(
+                    "write G0 {name}=... or G1 {name}=... F...: the tool tip then stays where it is programmed"
+                )));
+        }
         block.positions.words.push((axis, AxisWord { typed, form: value.form, columns: columns.clone() }));
         block.positions.waits[axis] |= waits;
         Ok(())
@@ -49,7 +59,7 @@ impl Interpreter {
 
     /// Starts the positioning axes of a block.
     pub(super) fn start_positions(&mut self, block: &Collected) -> Outcome<()> {
-        let mut words = MotionWords { suppress_frames: block.motion.suppress_frames, ..MotionWords::default() };
+        let mut words = MotionWords { suppression: block.motion.suppression, ..MotionWords::default() };
         for (axis, word) in &block.positions.words {
             if block.motion.axes[*axis].is_some() {
                 let message = "an axis of the path cannot be positioned in the same block";
@@ -62,10 +72,12 @@ impl Interpreter {
             return Ok(());
         }
         let end = self.end_point(&words)?;
+        self.check_work_area(&words, &MoveKind::Rapid, &end)?;
         self.check_travel(&words, end);
-        self.note_applied(&words);
-        let named = words.axes.map(|word| word.is_some());
+        let named = PerAxis::from_fn(|axis| words.axes[axis].is_some());
+        let start = self.position;
         self.position_axes(end, named, false);
+        self.note_programmed(&words, start);
         Ok(())
     }
 
@@ -79,7 +91,19 @@ impl Interpreter {
     /// True where G0 moves every axis on its own.
     pub(super) fn rapid_by_axis(&self, exact_stop: bool) -> bool {
         let stops = exact_stop || self.modal.path_mode == PathMode::ExactStop;
-        self.modal.feed_modes.rapid_by_axis && stops && self.modal.compressor == Compressor::Off
+        let transformed = matches!(self.machine.kinematics, KinematicsSettings::Rotary { .. });
+        self.modal.feed_modes.rapid_by_axis && stops && self.modal.compressor == Compressor::Off && !transformed
+    }
+
+    /// An axis whose position the transformation computes from several programmed ones.
+    fn in_transformation(&self, axis: AxisId) -> bool {
+        match &self.machine.kinematics {
+            KinematicsSettings::Cartesian => false,
+            KinematicsSettings::Rotary { table, head } => {
+                let joint = table.iter().chain(head).any(|joint| joint.axis == axis);
+                joint || self.geometry.contains(&Some(axis))
+            }
+        }
     }
 
     /// G0 under RTLIOF.

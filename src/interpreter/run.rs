@@ -3,20 +3,29 @@
 //! In: a [`ProgramSource`] and the [`Machine`]. Out: [`Move`]s, warnings, at most one alarm. Words are executed in `block`, motion
 //! in `motion`, jumps and loops in `flow`.
 
+use super::active_frames::ActiveFrames;
+use super::call::{Head, ModalCall, Waiting};
+use super::flow::Repeat;
+use super::frame::GeometryAxes;
 use super::modal::Modal;
 use super::path_words::CornerWords;
-use super::setup::Setup;
+use super::placement::KnownPlace;
+use super::setup::{Setup, geometry_axes};
 use super::system_values::ChannelMemory;
+use super::tool_words::ToolState;
 use super::variables::Variables;
 use super::wire::{Event, Feed, MainRun, Move, MoveKind};
-use crate::base::{AxisId, Diagnostic, PartPoint, PerAxis};
+use super::work_area::WorkArea;
+use super::zero_offsets::ZeroOffsets;
+use crate::base::{AxisVector, Diagnostic, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::plain_block;
+use crate::program::structure::skip_level_of;
 use crate::program::syntax::{Direction, Statement};
 use crate::program::visit::priority_trap;
 use crate::program::{
-    Block, BlockRef, Columns, Cursor, Dialect, Fault, NotActedOn, OpenedProgram, Outcome, ProgramId, ProgramSource,
-    codes, parse,
+    Block, BlockRef, Columns, Cursor, Dialect, Fault, Library, NotActedOn, Outcome, ProgramId, ProgramSource, UnitId,
+    Window, codes, parse,
 };
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -35,10 +44,12 @@ pub struct Interpreter {
     /// What lies around the program.
     pub(super) setup: Arc<Setup>,
     pub(super) program: ProgramId,
+    /// What of it is in memory.
+    pub(super) window: Window,
     pub(super) machine: Arc<Machine>,
     pub(super) dialect: Arc<Dialect>,
     /// X, Y and Z of the machine: the geometry axes.
-    pub(super) geometry: [Option<AxisId>; 3],
+    pub(super) geometry: GeometryAxes,
     /// The line in execution.
     pub(super) current: Cursor,
     /// The line after it, or where a jump leads.
@@ -46,10 +57,18 @@ pub struct Interpreter {
     /// Running number of the block.
     pub(super) number: u64,
     pub(super) modal: Modal,
+    /// $P_UIFR and $P_UBFR.
+    pub(super) zero_offsets: Arc<ZeroOffsets>,
+    /// $P_UBFR was written since the last G500 or G54.
+    pub(super) basic_is_pending: bool,
+    pub(super) work_area: WorkArea,
+    pub(super) tools: ToolState,
     /// All axes where the last move ended.
     pub(super) position: PartPoint,
-    /// Translation that each axis had when it last moved.
-    pub(super) applied_lu: crate::base::AxisVector,
+    /// Where each axis was sent last, in the workpiece system of then: incremental words count from here.
+    pub(super) programmed_lu: AxisVector,
+    /// `position` in the workpiece system.
+    pub(super) known_place: KnownPlace,
     pub(super) variables: Variables,
     /// Markers, parameters and clocks of the channel.
     pub(super) memory: ChannelMemory,
@@ -65,17 +84,37 @@ pub struct Interpreter {
     pub(super) in_definitions: bool,
     /// Moves of the block in execution.
     pub(super) queue: VecDeque<Move>,
-    /// Block numbers that jumps have found, by line and direction of the jump.
-    pub(super) found_numbers: BTreeMap<(u32, Direction, u64), Option<Cursor>>,
+    /// All programs of the run.
+    pub(super) library: Library,
+    /// The program in execution.
+    pub(super) unit: UnitId,
+    /// Programs that wait for its end, outermost first.
+    pub(super) levels: Vec<Waiting>,
+    /// Repeated parts in execution, outermost first.
+    pub(super) repeats: Vec<Repeat>,
+    /// What is known of the program in execution.
+    pub(super) known: Memory,
+    /// Memories of programs that are not in execution.
+    pub(super) shelf: BTreeMap<UnitId, Memory>,
+    pub(super) heads: BTreeMap<UnitId, Head>,
+    pub(super) modal_call: Option<Arc<ModalCall>>,
     warnings: Vec<Diagnostic>,
     /// Words and codes that were reported.
     warned: BTreeSet<&'static str>,
     pub(super) travel_warned: PerAxis<bool>,
-    opened: Option<Event>,
+    /// Openings of programs that no move has told yet.
+    pub(super) opened: Vec<Event>,
     state: State,
     pub(super) idle_blocks: u32,
     /// Where the move ended that was handed over last: the next one takes time only if it leads elsewhere.
     handed_over: PartPoint,
+}
+
+/// What is remembered of a program, so that loops and repeated calls are fast.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    /// Block numbers that jumps have found, by line and direction of the jump.
+    pub found_numbers: BTreeMap<(u32, Direction, u64), Option<Cursor>>,
     kept_blocks: BTreeMap<u32, Arc<Block>>,
     furthest_line: u32,
 }
@@ -97,18 +136,28 @@ impl Interpreter {
         for id in machine.axis_ids() {
             position.0[id] = machine.axis(id).home_lu;
         }
-        let opened = OpenedProgram { id: ProgramId(0), name: source.file_name().into(), bytes: source.bytes().clone() };
+        let geometry = geometry_axes(machine);
+        let zero_offsets = setup.zero_offsets.clone();
+        let modal = Modal::new(&machine.feed, initial_frames(&zero_offsets, geometry));
+        let known_place = KnownPlace::new(modal.frames.clone(), position);
+        let opened = source.opened(ProgramId(0));
         Self {
             program: ProgramId(0),
+            window: Window::default(),
             dialect: Arc::new(Dialect::new(machine)),
-            geometry: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)),
+            geometry,
             current: source.first(),
             next: source.first(),
             number: 0,
-            modal: Modal::new(&machine.feed),
+            modal,
+            zero_offsets,
+            basic_is_pending: false,
+            work_area: WorkArea::default(),
+            tools: ToolState::new(setup.tools.clone()),
             position,
-            applied_lu: crate::base::AxisVector::zero(),
-            variables: Variables::default(),
+            programmed_lu: known_place.work_lu(),
+            known_place,
+            variables: Variables::new(geometry),
             memory: ChannelMemory::default(),
             main_run: MainRun::default(),
             trace_events: Vec::new(),
@@ -116,16 +165,21 @@ impl Interpreter {
             globals_defined: false,
             in_definitions: false,
             queue: VecDeque::new(),
-            found_numbers: BTreeMap::new(),
+            library: Library::new(source.clone(), setup.directories.clone(), setup.shipped),
+            unit: UnitId(0),
+            levels: Vec::new(),
+            repeats: Vec::new(),
+            known: Memory::default(),
+            shelf: BTreeMap::new(),
+            heads: BTreeMap::new(),
+            modal_call: None,
             warnings: Vec::new(),
             warned: BTreeSet::new(),
             travel_warned: PerAxis::splat(false),
-            opened: Some(Event::ProgramOpened(opened)),
+            opened: vec![Event::ProgramOpened(opened)],
             state: State::Running,
             idle_blocks: 0,
             handed_over: position,
-            kept_blocks: BTreeMap::new(),
-            furthest_line: 0,
             machine: Arc::new(machine.clone()),
             setup: Arc::new(setup),
             source,
@@ -158,7 +212,7 @@ impl Interpreter {
             if let Err(fault) = self.step() {
                 self.state = State::Alarm(Box::new(self.diagnostic(*fault)));
             }
-            if !matches!(self.state, State::Running) && self.queue.is_empty() && self.opened.is_some() {
+            if !matches!(self.state, State::Running) && self.queue.is_empty() && !self.opened.is_empty() {
                 // The program is on record even if it does nothing.
                 self.emit_function(Vec::new(), false);
             }
@@ -190,10 +244,11 @@ impl Interpreter {
         if !std::mem::replace(&mut self.globals_defined, true) {
             self.define_globals()?;
         }
-        let source = self.source.clone();
-        let Some((bytes, following)) = source.line_bytes(self.next) else {
-            self.end();
-            return Ok(());
+        if !self.repeats.is_empty() && self.part_ends()? {
+            return if self.idle_blocks > IDLE_BLOCKS_MAX { Err(self.endless()) } else { Ok(()) };
+        }
+        let Some((bytes, following)) = self.source.line(&mut self.window, self.next)? else {
+            return self.end();
         };
         self.current = self.next;
         self.next = following;
@@ -201,12 +256,16 @@ impl Interpreter {
         if self.idle_blocks > IDLE_BLOCKS_MAX {
             return Err(self.endless());
         }
-        if let Some(plain) = plain_block(bytes, &self.dialect)
+        if let Some(plain) = plain_block(&bytes, &self.dialect)
             && self.plain_move(&plain)
         {
+            return if self.modal_call.is_some() { self.after_motion() } else { Ok(()) };
+        }
+        let skipped = self.setup.skip_levels;
+        if skipped != 0 && skip_level_of(&bytes).is_some_and(|level| skipped >> level & 1 == 1) {
             return Ok(());
         }
-        let block = self.parsed(bytes)?;
+        let block = self.parsed(&bytes)?;
         if block.reads_main_run && !std::mem::replace(&mut self.rests_for_main_run, true) {
             self.report_plc_reads(&block);
             // The block itself is executed when the path rests.
@@ -218,24 +277,43 @@ impl Interpreter {
         if block.statement != Statement::Words(Vec::new()) {
             self.number += 1;
         }
-        self.execute(&block.statement)
+        let depth = self.levels.len();
+        self.execute(&block.statement)?;
+        if self.modal_call.is_some() && self.levels.len() == depth && matches!(self.state, State::Running) {
+            return self.after_motion();
+        }
+        Ok(())
     }
 
     /// Parses the line in execution; what a loop passes again is kept.
     fn parsed(&mut self, bytes: &[u8]) -> Outcome<Arc<Block>> {
         let line = self.current.line;
-        if let Some(kept) = self.kept_blocks.get(&line) {
+        if let Some(kept) = self.known.kept_blocks.get(&line) {
             return Ok(kept.clone());
         }
         let block = Arc::new(parse(&self.source.decode(bytes), &self.dialect)?);
         if let Some(columns) = priority_trap(&block.statement) {
             self.warn_of_priority(columns);
         }
-        let is_short = bytes.len() <= KEPT_LINE_BYTES_MAX;
-        if line <= self.furthest_line && is_short && self.kept_blocks.len() < KEPT_BLOCKS_MAX {
-            self.kept_blocks.insert(line, block.clone());
+        if line <= self.known.furthest_line {
+            self.known.keep(line, &block, bytes.len());
         }
-        self.furthest_line = self.furthest_line.max(line);
+        self.known.furthest_line = self.known.furthest_line.max(line);
+        Ok(block)
+    }
+
+    /// The block at a line that was executed before.
+    pub(super) fn block_at(&mut self, cursor: Cursor) -> Outcome<Arc<Block>> {
+        if let Some(kept) = self.known.kept_blocks.get(&cursor.line) {
+            return Ok(kept.clone());
+        }
+        let line = self.source.line(&mut self.window, cursor)?;
+        let (text, length) = match &line {
+            Some((bytes, _)) => (self.source.decode(bytes), bytes.len()),
+            None => ("".into(), 0),
+        };
+        let block = Arc::new(parse(&text, &self.dialect)?);
+        self.known.keep(cursor.line, &block, length);
         Ok(block)
     }
 
@@ -246,15 +324,15 @@ impl Interpreter {
         }
     }
 
-    /// M2, M30, M17, RET or the end of the text.
-    pub(super) fn end(&mut self) {
+    /// The end of the run.
+    pub(super) fn finish(&mut self) {
         self.state = State::Ended;
     }
 
     /// Hands a move over.
     pub(super) fn emit(&mut self, kind: MoveKind, feed: Feed, exact_stop: bool, mut events: Vec<Event>) {
-        if let Some(opened) = self.opened.take() {
-            events.insert(0, opened);
+        if !self.opened.is_empty() {
+            events.splice(0..0, self.opened.drain(..));
         }
         let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
         let modes = self.modal.modes(exact_stop);
@@ -302,8 +380,10 @@ impl Interpreter {
     }
 
     fn diagnostic(&self, fault: Fault) -> Diagnostic {
-        let text = self.source.line_text(self.current).into_owned();
-        fault.at(self.source.shared_name(), self.current.line, text)
+        let text = self.source.line_text(self.current);
+        let mut diagnostic = fault.at(self.source.shared_name(), self.current.line, text);
+        diagnostic.called_from = self.called_from();
+        diagnostic
     }
 
     fn endless(&self) -> Box<Fault> {
@@ -312,6 +392,23 @@ impl Interpreter {
         Fault::new(codes::ENDLESS, 0..end, message)
             .label("executed again and again")
             .help("check the condition of the loop or jump")
+    }
+}
+
+/// G500 and the basic frame.
+fn initial_frames(offsets: &ZeroOffsets, axes: GeometryAxes) -> ActiveFrames {
+    let mut frames = ActiveFrames::new(axes);
+    frames.set_basic(offsets.basic(axes));
+    frames.set_settable(0, offsets.settable(0, axes));
+    frames
+}
+
+impl Memory {
+    /// Keeps a parsed block, within bounds.
+    fn keep(&mut self, line: u32, block: &Arc<Block>, length: usize) {
+        if length <= KEPT_LINE_BYTES_MAX && self.kept_blocks.len() < KEPT_BLOCKS_MAX {
+            self.kept_blocks.insert(line, block.clone());
+        }
     }
 }
 

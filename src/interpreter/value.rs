@@ -4,6 +4,7 @@
 //! control's rule for assignments: a fraction of 0.5 or more is rounded up). Comparison of REAL is relative (1e-12). A CHAR is a number
 //! where numbers are needed and a text of one character where texts are.
 
+use super::frame::Frame;
 use crate::base::AxisId;
 use crate::program::{Columns, Fault, Outcome, codes};
 use std::cmp::Ordering;
@@ -27,6 +28,8 @@ pub enum Value {
     Text(Arc<str>),
     /// AXIS; `None` before the first assignment.
     Axis(Option<AxisId>),
+    /// FRAME.
+    Frame(Arc<Frame>),
 }
 
 impl Value {
@@ -44,6 +47,11 @@ impl Value {
             Self::Axis(_) => {
                 Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "an axis stands where a number is needed")
                     .label("expected a number"))
+            }
+            Self::Frame(_) => {
+                Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "a frame stands where a number is needed")
+                    .label("expected a number")
+                    .help("[X,TR] behind its name gives a component"))
             }
         }
     }
@@ -73,7 +81,7 @@ impl Value {
             Self::Char('\0') => Some("".into()),
             Self::Char(character) => Some(character.to_string().into()),
             Self::Real(value) => Some(trimmed(*value).into()),
-            Self::Axis(_) => None,
+            Self::Axis(_) | Self::Frame(_) => None,
         }
     }
 
@@ -84,6 +92,8 @@ impl Value {
             (Self::Text(_), Self::Char(_)) | (Self::Char(_), Self::Text(_)) => Ok(self.text().cmp(&other.text())),
             (Self::Int(a), Self::Int(b)) => Ok(a.cmp(b)),
             (Self::Axis(a), Self::Axis(b)) => Ok(a.cmp(b)),
+            // Frames are equal or not; there is no order.
+            (Self::Frame(a), Self::Frame(b)) => Ok(if a == b { Ordering::Equal } else { Ordering::Less }),
             _ => {
                 let (a, b) = (self.number(columns)?, other.number(columns)?);
                 if (a - b).abs() <= EQUAL_RATIO * a.abs().max(b.abs()) {

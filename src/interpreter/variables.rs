@@ -2,6 +2,7 @@
 //!
 //! In: definitions, assignments. Out: values. Memory is bounded. Undeclared names are findings with the nearest declared one.
 
+use super::frame::{Frame, GeometryAxes};
 use super::value::Value;
 use crate::base::diagnostics::nearest;
 use crate::program::syntax::VariableType;
@@ -18,10 +19,84 @@ const ELEMENTS_MAX: usize = 100_000;
 #[derive(Clone, Debug, Default)]
 pub struct Variables {
     parameters: Vec<f64>,
+    /// Those of the program in execution.
     declared: BTreeMap<Arc<str>, Variable>,
+    /// Those of the programs that wait for its end, outermost first: out of its sight (MD11120 = 0).
+    waiting: Vec<BTreeMap<Arc<str>, Variable>>,
     /// GUD: known to all programs.
     global: BTreeMap<Arc<str>, Variable>,
     elements: usize,
+    /// Axes that the frames of a program turn.
+    frame_axes: GeometryAxes,
+}
+
+/// A whole variable, outside of [`Variables`].
+#[derive(Clone, Debug)]
+pub struct Whole(Variable);
+
+impl Whole {
+    /// A single value, converted to its type; `line` is where it is declared.
+    pub fn of(variable_type: VariableType, value: &Value, line: u32, columns: &Columns) -> Outcome<Self> {
+        let value = convert(variable_type, value, columns)?;
+        Ok(Self(Variable { variable_type, line, dimensions: Vec::new(), values: vec![value] }))
+    }
+
+    /// All values the same; `line` is where it is declared.
+    pub fn filled(
+        variable_type: VariableType,
+        sizes: &[i32],
+        value: &Value,
+        line: u32,
+        columns: &Columns,
+    ) -> Outcome<Self> {
+        let Self(mut variable) = Self::of(variable_type, value, line, columns)?;
+        let sizes: Vec<usize> = sizes.iter().map(|size| usize::try_from(*size).unwrap_or(0).max(1)).collect();
+        let count = sizes.iter().fold(1_usize, |count, size| count.saturating_mul(*size));
+        if count > ELEMENTS_MAX {
+            return Err(Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), format!("an array of {count} elements"))
+                .label(format!("at most {ELEMENTS_MAX}")));
+        }
+        variable.values.resize(count, variable.values[0].clone());
+        variable.dimensions = sizes;
+        Ok(Self(variable))
+    }
+
+    /// The same as a parameter of that type, declared in `line`: every value is converted.
+    pub fn converted(mut self, variable_type: VariableType, line: u32, columns: &Columns) -> Outcome<Self> {
+        for value in &mut self.0.values {
+            *value = convert(variable_type, value, columns)?;
+        }
+        self.0.variable_type = variable_type;
+        self.0.line = line;
+        Ok(self)
+    }
+
+    /// Its type.
+    pub fn variable_type(&self) -> VariableType {
+        self.0.variable_type
+    }
+
+    /// Sizes of its dimensions; empty for a single value.
+    pub fn dimensions(&self) -> &[usize] {
+        &self.0.dimensions
+    }
+
+    /// The value of a single one.
+    pub fn single(&self) -> Option<&Value> {
+        self.0.values.first().filter(|_| self.0.dimensions.is_empty())
+    }
+}
+
+/// Value before the first assignment.
+fn zero(variable_type: VariableType, frame_axes: GeometryAxes) -> Value {
+    match variable_type {
+        VariableType::Bool => Value::Bool(false),
+        VariableType::Char | VariableType::Int => Value::Int(0),
+        VariableType::Real => Value::Real(0.0),
+        VariableType::Text(_) => Value::Text(Arc::from("")),
+        VariableType::Axis => Value::Axis(None),
+        VariableType::Frame => Value::Frame(Arc::new(Frame::identity(frame_axes))),
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -35,6 +110,33 @@ struct Variable {
 }
 
 impl Variables {
+    /// None yet; frames of the program turn these axes.
+    pub fn new(frame_axes: GeometryAxes) -> Self {
+        Self { frame_axes, ..Self::default() }
+    }
+
+    /// What a variable holds before the first assignment.
+    pub fn zero(&self, variable_type: VariableType) -> Value {
+        zero(variable_type, self.frame_axes)
+    }
+
+    /// Number of dimensions of a variable of type FRAME; `None`: it is none.
+    pub fn frame_dimensions(&self, name: &str) -> Option<usize> {
+        let variable = self.find(name).filter(|variable| variable.variable_type == VariableType::Frame)?;
+        Some(variable.dimensions.len())
+    }
+
+    /// A sub-program begins: it sees R parameters and none of the variables of its caller.
+    pub fn enter(&mut self) {
+        self.waiting.push(std::mem::take(&mut self.declared));
+    }
+
+    /// It ends: its variables are gone.
+    pub fn leave(&mut self) {
+        let gone = std::mem::replace(&mut self.declared, self.waiting.pop().unwrap_or_default());
+        self.elements -= gone.values().map(|variable| variable.values.len()).sum::<usize>();
+    }
+
     /// R parameter; 0 before the first assignment.
     pub fn parameter(&self, number: i32, columns: &Columns) -> Outcome<f64> {
         Ok(self.parameters.get(parameter_index(number, columns)?).copied().unwrap_or(0.0))
@@ -116,20 +218,37 @@ impl Variables {
             .label(format!("at most {ELEMENTS_MAX}")));
         }
         self.elements = elements;
-        let zero = match variable_type {
-            VariableType::Bool => Value::Bool(false),
-            VariableType::Char | VariableType::Int => Value::Int(0),
-            VariableType::Real => Value::Real(0.0),
-            VariableType::Text(_) => Value::Text(Arc::from("")),
-            VariableType::Axis => Value::Axis(None),
-            VariableType::Frame => {
-                return Err(
-                    Fault::new(codes::NOT_BUILT, columns.clone(), "FRAME: not built yet").label("not built yet")
-                );
-            }
-        };
+        let zero = self.zero(variable_type);
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
+        Ok(())
+    }
+
+    /// A whole variable, to be handed to a sub-program.
+    pub fn whole(&self, name: &str, columns: &Columns) -> Outcome<Whole> {
+        self.declared(name, columns).map(|variable| Whole(variable.clone()))
+    }
+
+    /// A whole variable as a sub-program left it: stored in one of the same size.
+    pub fn set_whole(&mut self, name: &str, whole: Whole) {
+        if let Some(variable) = self.find_mut(name)
+            && variable.values.len() == whole.0.values.len()
+        {
+            variable.values = whole.0.values;
+        }
+    }
+
+    /// A parameter of a sub-program.
+    pub fn define_parameter(&mut self, name: &Arc<str>, whole: Whole, columns: &Columns) -> Outcome<()> {
+        let elements = self.elements.saturating_add(whole.0.values.len());
+        if elements > ELEMENTS_MAX {
+            let message = format!("all variables together would have {elements} elements");
+            return Err(
+                Fault::new(codes::TOO_MUCH_MEMORY, columns.clone(), message).label(format!("at most {ELEMENTS_MAX}"))
+            );
+        }
+        self.elements = elements;
+        self.declared.insert(name.clone(), whole.0);
         Ok(())
     }
 
@@ -300,8 +419,11 @@ fn convert(variable_type: VariableType, value: &Value, columns: &Columns) -> Out
                 .label("expected the name of an axis")
                 .help("AXNAME makes an axis of a text"));
         }
-        // DEF refuses it.
-        (VariableType::Frame, value) => value.clone(),
+        (VariableType::Frame, Value::Frame(_)) => value.clone(),
+        (VariableType::Frame, _) => {
+            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "only a frame can be stored in a FRAME")
+                .label("expected a frame such as CTRANS(X, 10)"));
+        }
         (VariableType::Bool, Value::Text(text)) => Value::Bool(!text.is_empty()),
         (VariableType::Char, Value::Char(character)) => Value::Int(*character as i32),
         (VariableType::Bool, value) => Value::Bool(value.truth(columns)?),

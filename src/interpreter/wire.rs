@@ -136,8 +136,10 @@ pub struct Positioning {
 pub struct CornerInsert {
     /// Fillet or chamfer.
     pub shape: CornerShape,
-    /// Plane in which the corner lies: first and second axis. `None`: the plane has no two linear axes.
+    /// Plane in which the corner lies: first and second axis.
     pub plane: [AxisId; 2],
+    /// Where frames tilt the plane: unit vectors in it, at right angles, components of the linear axes.
+    pub directions: Option<[AxisVector; 2]>,
     /// FRC or FRCM; `None`: the feed of the block that leads away.
     pub feed_mm_s: Option<f64>,
 }

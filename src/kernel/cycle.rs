@@ -216,8 +216,8 @@ impl<S: PieceSource> Kernel<S> {
         for row in self.output.rows.iter().filter(|row| row.tick == setpoint.tick) {
             actual.0[row.axis] = row.signals.position_actual_lu;
         }
-        self.output.tool_setpoint = self.kinematics.tool_pose(&sent);
-        self.output.tool_actual = self.kinematics.tool_pose(&actual);
+        self.output.tool_setpoint = self.kinematics.tip_pose(&sent, &setpoint.tool_length);
+        self.output.tool_actual = self.kinematics.tip_pose(&actual, &setpoint.tool_length);
         self.contour_error.push(self.output.tool_setpoint.position_mm);
         if self.drives.iter().any(|drive| matches!(drive, Drive::Cascade(_))) {
             self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);

@@ -11,7 +11,7 @@ use super::threads::PreparationThread;
 use crate::base::Diagnostic;
 use crate::interpreter::Setup;
 use crate::machine::{Loaded, Machine, unsupported};
-use crate::program::{OpenedProgram, ProgramId};
+use crate::program::ProgramId;
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
 use std::sync::Arc;
@@ -134,11 +134,7 @@ const PROGRESS_TICKS: u64 = 4096;
 
 fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Option<Recorder>, RunError> {
     let Some(path) = options.recording else { return Ok(None) };
-    let main = OpenedProgram {
-        id: ProgramId(0),
-        name: options.setup.program.file_name().into(),
-        bytes: options.setup.program.bytes().clone(),
-    };
+    let main = options.setup.program.opened(ProgramId(0));
     let programs = std::slice::from_ref(&main);
     let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, programs);
     setup.mantissa_bits = options.mantissa_bits;

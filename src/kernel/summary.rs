@@ -69,7 +69,10 @@ pub struct CornerSummary {
 pub struct Warning {
     /// Stable code.
     pub code: String,
-    /// Line in the program, 0 without one.
+    /// File, as the user named it; left out without a place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Line in it, 0 without one.
     pub line: u32,
     /// What it is.
     pub message: String,
@@ -77,7 +80,10 @@ pub struct Warning {
 
 impl From<&Diagnostic> for Warning {
     fn from(finding: &Diagnostic) -> Self {
-        Self { code: finding.code.to_owned(), line: finding.line(), message: finding.message.clone() }
+        // Without folders: a recording knows no path.
+        let name = |file: &str| file.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
+        let file = finding.place.as_ref().map(|place| name(&place.file));
+        Self { code: finding.code.to_owned(), file, line: finding.line(), message: finding.message.clone() }
     }
 }
 

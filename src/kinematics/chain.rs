@@ -9,13 +9,13 @@
 //! models/feed-prediction-and-surface.md section 1)
 //!
 //! ```text
-//! pose of the tool in the part = (J_1 .. J_n)^-1  translation(XYZ)  H_1 .. H_m
+//! pose of the tool in the part = (J_1 .. J_n)^-1  translation(XYZ)  H_1 .. H_m  translation(-L)
 //! ```
 //!
-//! Tool length is 0: the position is that of the tip whose axis positions are recorded. Does not solve the inverse problem.
+//! with the length L of the tool (position of the axes minus position of the tip, head at 0). Does not solve the inverse problem.
 
 use super::JointPath;
-use crate::base::{AxisId, MachinePoint};
+use crate::base::{AxisId, AxisVector, MachinePoint};
 use crate::machine::{KinematicsSettings, Machine, RotaryJoint};
 use crate::smoothing::ContourPiece;
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -72,13 +72,21 @@ impl Kinematics {
         JointPath { contour: piece }
     }
 
-    /// Pose of the tool when the axes stand at `posture`.
+    /// Pose of a tool without length when the axes stand at `posture`.
     pub fn tool_pose(&self, posture: &MachinePoint) -> ToolPose {
+        self.tip_pose(posture, &AxisVector::zero())
+    }
+
+    /// Pose of the tool when the axes stand at `posture`. `length`: position of the axes minus position of the tip, with the head at 0.
+    pub fn tip_pose(&self, posture: &MachinePoint, length: &AxisVector) -> ToolPose {
+        let [length_x_mm, length_y_mm, length_z_mm] =
+            self.geometry_axes.map(|axis| axis.map_or(0.0, |axis| length[axis]));
         let [x, y, z] = self.geometry_axes.map(|axis| axis.map_or(0.0, |axis| posture.0[axis]));
         let chain = |joints: &[Joint]| {
             joints.iter().fold(Isometry3::identity(), |carried, joint| carried * joint.turned(posture.0[joint.axis]))
         };
         let pose = chain(&self.table).inverse() * Translation3::new(x, y, z) * chain(&self.head);
+        let pose = pose * Translation3::new(-length_x_mm, -length_y_mm, -length_z_mm);
         // The product of unit quaternions drifts from length 1 by rounding only, but a recording is read by strangers.
         let rotation = UnitQuaternion::new_normalize(pose.rotation.into_inner());
         let axis = rotation * Vector3::z();

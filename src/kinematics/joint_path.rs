@@ -1,7 +1,7 @@
 //! q(s) of a piece of path.
 //!
 //! In: the contour piece inside a [`JointPath`]. Out: its length and [`JointState`]s. The mapping is the identity: without an
-//! active transformation the programmed positions are those of the machine axes, with tool length 0. A transformation would put
+//! active transformation the axes stand where the tip of the tool is, plus the length of the tool. A transformation would put
 //! its chain rule here and nowhere else.
 
 use super::{JointPath, JointState};
@@ -16,6 +16,15 @@ impl JointPath {
 
     /// Posture and derivatives at s, clamped to the ends of the piece.
     pub fn at(&self, s_lu: f64) -> JointState {
+        let mut state = self.tip_at(s_lu);
+        if let Some(tool) = &self.contour.modes.tool {
+            state.position.0 += tool.length;
+        }
+        state
+    }
+
+    /// The same for the tip of the tool.
+    fn tip_at(&self, s_lu: f64) -> JointState {
         match &self.contour.kind {
             PieceKind::Block(curve) | PieceKind::Blend(curve, _) => {
                 let state = curve.at(s_lu);

@@ -179,6 +179,46 @@ const SMOOTHING: &[Key] = &[
     ),
     Key::new("shape", "", Choice(words::<BlendShape>), Word("hermite3"), "curve of a blend"),
     Key::new("limits", "", Choice(words::<BlendLimits>), Word("axis"), "limits of a blend: per axis, or of the path"),
+    Key::new(
+        "orientation_tolerance_deg",
+        "deg",
+        Number(Range::Positive),
+        Value(0.1),
+        "tolerance of rotary axes without OTOL",
+    )
+    .md("SD42466"),
+    Key::new(
+        "transition_tolerance_mm",
+        "mm",
+        Number(Range::Positive),
+        Value(0.005),
+        "tolerance of G645 where a tangential transition changes its curvature",
+    )
+    .md("MD33120"),
+    Key::new(
+        "rapid_tolerance_ratio",
+        "",
+        Number(Range::Positive),
+        Value(1.0),
+        "factor of the tolerances between two rapids without STOLF",
+    )
+    .md("MD20560"),
+    Key::new(
+        "compressor_length_max_mm",
+        "mm",
+        Number(Range::Positive),
+        Value(20.0),
+        "longest block that the compressor takes",
+    )
+    .md("MD20170"),
+    Key::new(
+        "compressor_corner_deg",
+        "deg",
+        Number(Range::Between(0.0, 90.0)),
+        Value(36.0),
+        "turning angle from which the compressor leaves a corner",
+    )
+    .md("SD42470"),
 ];
 
 const KINEMATICS: &[Key] = &[

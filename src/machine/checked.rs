@@ -221,6 +221,16 @@ pub struct SmoothingSettings {
     pub shape: BlendShape,
     /// Which limits a blend is planned with.
     pub limits: BlendLimits,
+    /// Rotary axes without OTOL (SD42466).
+    pub orientation_tolerance_rad: f64,
+    /// G645 at changes of curvature (MD33120).
+    pub transition_tolerance_mm: f64,
+    /// Between rapids without STOLF (MD20560).
+    pub rapid_tolerance_ratio: f64,
+    /// Longest block for the compressor (MD20170).
+    pub compressor_length_max_mm: f64,
+    /// Turning angle that the compressor leaves as a corner (SD42470).
+    pub compressor_corner_rad: f64,
 }
 
 /// One rotary axis of the kinematic chain.

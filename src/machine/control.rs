@@ -8,6 +8,7 @@ use super::choices::{Carries, Choice, KinematicsType};
 use super::document::Node;
 use super::section::Section;
 use crate::base::diagnostics::{Diagnostic, nearest};
+use crate::base::units::rad_from_deg;
 use crate::base::{AxisId, AxisKind};
 
 /// Rotary axes that a kinematic chain may have.
@@ -43,6 +44,11 @@ pub(super) fn smoothing(root: &Section<'_>) -> SmoothingSettings {
         blend_law: smoothing.choice("blend_law"),
         shape: smoothing.choice("shape"),
         limits: smoothing.choice("limits"),
+        orientation_tolerance_rad: rad_from_deg(smoothing.number("orientation_tolerance_deg")),
+        transition_tolerance_mm: smoothing.number("transition_tolerance_mm"),
+        rapid_tolerance_ratio: smoothing.number("rapid_tolerance_ratio"),
+        compressor_length_max_mm: smoothing.number("compressor_length_max_mm"),
+        compressor_corner_rad: rad_from_deg(smoothing.number("compressor_corner_deg")),
     }
 }
 

@@ -64,7 +64,7 @@ pub fn load(path_or_shipped_name: &str, sets: &[String]) -> Result<Loaded, LoadE
     parse(&SourceText::new(path_or_shipped_name, text), sets).map_err(LoadError::Invalid)
 }
 
-fn read_file(path: &Path) -> Result<String, String> {
+pub(super) fn read_file(path: &Path) -> Result<String, String> {
     let file = File::open(path).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
     file.take(FILE_SIZE_MAX + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;

@@ -21,6 +21,8 @@ mod periods;
 mod schema;
 mod section;
 mod shipped;
+mod tools;
+mod workshop;
 
 pub use catalogue::tables;
 pub use checked::*;
@@ -30,3 +32,5 @@ pub use later::unsupported;
 pub use load::{LoadError, Loaded, load, parse};
 pub use schema::schema;
 pub use shipped::{DEFAULT_MACHINE, shipped};
+pub use tools::{EDGE_MAX, Tool, ToolEdge, ToolTable, Workshop, ZeroOffset};
+pub use workshop::{load_workshop, read_workshop};

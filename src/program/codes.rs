@@ -74,6 +74,7 @@ macro_rules! codes {
 
 codes! {
     UNREADABLE "E0001" "The program file cannot be read";
+    LOST "E0002" "The program file changed or went away while it was read";
     BAD_CHARACTER "E0101" "A character that has no meaning here";
     BAD_NUMBER "E0102" "A number that cannot be read";
     OPEN_STRING "E0103" "A string without its closing quote";
@@ -86,7 +87,7 @@ codes! {
     UNKNOWN_G "E0203" "A G function that does not exist";
     UNKNOWN_AXIS "E0204" "An axis that the machine does not have";
     TWICE "E0205" "An address or a G group programmed twice in one block";
-    NO_SUBPROGRAMS "E0206" "A call of a sub-program";
+    NO_SUBPROGRAMS "E0206" "A call of a sub-program that is not found";
     BAD_BLOCK "E0207" "Words that cannot stand in one block";
     UNDECLARED "E0301" "A variable without DEF";
     REDECLARED "E0302" "A variable defined twice, or with a reserved name";
@@ -101,6 +102,8 @@ codes! {
     NO_TARGET "E0401" "A jump to a label or block number that is not there";
     UNBALANCED "E0402" "IF, FOR, WHILE, LOOP or REPEAT without its end, or the other way round";
     ENDLESS "E0403" "A loop without motion that does not end";
+    CALL_DEPTH "E0404" "Sub-programs or repeated parts inside one another, too many levels deep";
+    BAD_ARGUMENT "E0405" "The values of a call do not fit the parameters of the sub-program";
     NO_FEED "E0501" "A feed motion without F";
     BAD_FEED "E0502" "A feed of zero or below";
     ARC_WITHOUT_CENTRE "E0503" "G2 or G3 without centre and without radius";
@@ -109,6 +112,10 @@ codes! {
     ARC_PLANE "E0506" "A plane whose axes the machine does not have";
     DWELL "E0507" "A G4 without a time, or with revolutions of a spindle that stands";
     MODULO "E0508" "DC, ACP or ACN for an axis that is not endless";
+    UNEQUAL_SCALE "E0509" "A circle that the frames would make an ellipse";
+    BAD_FRAME "E0510" "A frame that is not possible";
+    WORK_AREA "E0511" "A position outside the work area";
+    UNKNOWN_TOOL "E0512" "A tool or an edge that the tool table does not have";
     RAISED "E0601" "An alarm that the program itself raises (SETAL)";
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";

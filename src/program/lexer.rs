@@ -129,6 +129,19 @@ impl<'a> Lexer<'a> {
         Some(&self.text[start..self.at])
     }
 
+    /// Takes a path: everything up to a blank, a bracket or a comment; a text in quotes as it is. `None` if nothing is there.
+    pub fn path(&mut self) -> Option<&'a str> {
+        self.skip_blanks();
+        if self.byte(0) == Some(b'"') {
+            return self.quoted(b'"').ok();
+        }
+        let start = self.at;
+        while self.byte(0).is_some_and(|byte| byte.is_ascii_alphanumeric() || b"/\\_.:$-".contains(&byte)) {
+            self.at += 1;
+        }
+        (self.at > start).then(|| &self.text[start..self.at])
+    }
+
     /// Goes back to byte `position`, which must have been given by [`Self::position`] or lie inside an ASCII token.
     pub fn rewind(&mut self, position: usize) {
         self.at = position;

@@ -4,31 +4,40 @@
 //! [`Fault`] with its columns; the [`structure::Structure`] of labels and control words. Does not execute anything: expressions
 //! and control words stay syntax here.
 
+pub mod archive;
+mod call_syntax;
+mod calls;
+mod characters;
 pub mod codes;
 mod dialect;
 mod expression;
 mod lexer;
+pub mod library;
 mod not_acted_on;
 mod not_built;
 mod parser;
 pub mod plain;
 mod print;
+mod print_calls;
 pub mod source;
 mod statements;
 pub mod structure;
 pub mod syntax;
 mod system_variables;
+pub mod text;
 pub mod visit;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
 pub use dialect::{Dialect, taken_axis_names};
-pub use parser::{parse, whole_number};
+pub use library::{Library, Shipped, UnitId};
+pub use parser::{is_synchronised, parse, whole_number};
 pub use print::print;
-pub use source::{Cursor, ProgramSource};
+pub use source::{Cursor, Line, ProgramSource, Window};
 pub use statements::{TEXT_MAX, block_number, visit_names};
-pub use syntax::Block;
+pub use syntax::{Block, VariableType};
 pub use system_variables::{SYSTEM_VARIABLES, SystemVariable};
+pub use text::ProgramText;
 pub use visit::visit_expressions;
 pub use words::{NOT_ACTED_ON, NotActedOn, did_you_mean, known_words};
 
@@ -57,5 +66,5 @@ pub struct OpenedProgram {
     /// File name without folders.
     pub name: Arc<str>,
     /// Bytes as they are on the disk.
-    pub bytes: Arc<[u8]>,
+    pub bytes: ProgramText,
 }

@@ -29,7 +29,6 @@ pub static NOT_ACTED_ON: &[NotActedOn] = &[
         "CYCLE800",
         "the tool or table is not swivelled; programs that call it with angles need the swivelled positions",
     ),
-    entry("MCALL", "no cycle is repeated at the positions that follow: the axes only go there"),
     entry("CYCLE81", "the drilling motion of the cycle is not made"),
     entry("CYCLE82", "the drilling motion of the cycle is not made"),
     entry("CYCLE83", "the drilling motion of the cycle is not made"),
@@ -131,5 +130,5 @@ pub static NOT_ACTED_ON: &[NotActedOn] = &[
     entry("DO", "the synchronised action is not executed"),
     entry("CANCEL", "the synchronised action is not executed"),
     entry("$A_", "there is no PLC: inputs and PLC data are what the program wrote, else 0"),
-    entry("$TC_", "tool data are not kept: positions are those of the tool tip with length 0"),
+    entry("$TC_", "tool data other than those of edges ($TC_DP1 to 25) and names ($TC_TP2) are not kept"),
 ];

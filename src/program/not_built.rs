@@ -27,7 +27,6 @@ pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
         ],
         "kinematic transformations are not built yet: without them the axes would not go where the program says",
     ),
-    (&["CALL", "PCALL", "ISOCALL", "REPEATB"], "sub-programs and block repetition are not built yet"),
     (&["DIAMON", "DIAM90"], "diameter programming is not built yet"),
     (&["WRITE", "READ", "DELETE", "ISFILE"], "reading and writing files from the program is not built yet"),
     (&["MEAS", "MEAW", "MEAC"], "measuring is not built yet"),

@@ -4,6 +4,7 @@
 //! typo is one error. This file reads the frame of a block (skip level, number, label) and its words; statements that fill a block
 //! are read in `statements`. Does not execute.
 
+use super::calls::call_by_name;
 use super::codes::{self, Columns, Fault, Outcome};
 use super::dialect::Dialect;
 use super::expression::{arguments, expected, expression, indices, not_built, unused_expression};
@@ -14,7 +15,7 @@ use super::syntax::{
     Target, Word, WordKind,
 };
 use super::visit::reads_main_run;
-use super::words::{self, Control, IndexedAddress, NotActedOn, Role};
+use super::words::{self, IndexedAddress, NotActedOn, Role};
 
 /// Values that PO may have: the end point and coefficients.
 const COEFFICIENTS_MAX: usize = 8;
@@ -49,7 +50,6 @@ fn parse_words(text: &str, dialect: &Dialect) -> Outcome<Block> {
     if let Some(name) = lexer.name() {
         let columns = lexer.columns_from(start);
         match words::role(name) {
-            Some(Role::Control(Control::Declaration)) => return Ok(block),
             Some(Role::Control(control)) => {
                 block.statement = statement(control, &mut lexer, columns)?;
                 return end_of_block(lexer, block);
@@ -58,7 +58,12 @@ fn parse_words(text: &str, dialect: &Dialect) -> Outcome<Block> {
                 block.statement = Statement::NotActedOn(entry, columns);
                 return Ok(block);
             }
-            _ => {}
+            _ => {
+                if let Some(call) = call_by_name(name, columns, &mut lexer, dialect)? {
+                    block.statement = Statement::Call(Box::new(call));
+                    return end_of_block(lexer, block);
+                }
+            }
         }
     }
     lexer = before;
@@ -71,6 +76,11 @@ const ADDRESS_LETTERS: &[u8] = b"DFGHIJKLMNPRST";
 
 /// Words that open a synchronised action: the rest of the line belongs to it.
 const SYNCHRONISED: [&str; 7] = ["ID", "IDS", "WHEN", "WHENEVER", "EVERY", "FROM", "DO"];
+
+/// True for a word that opens a synchronised action.
+pub fn is_synchronised(word: &str) -> bool {
+    SYNCHRONISED.contains(&word)
+}
 
 fn end_of_block(mut lexer: Lexer, block: Block) -> Outcome<Block> {
     if lexer.at_end() {
@@ -124,6 +134,8 @@ fn label(lexer: &mut Lexer) -> Option<std::sync::Arc<str>> {
     if let Some(name) = name
         && name.len() > 1
         && lexer.peek_byte() == Some(b':')
+        // `GOTOF :90` leads to a main block.
+        && !matches!(words::role(name), Some(Role::Control(_)))
     {
         lexer.skip_byte();
         return Some(name.to_ascii_uppercase().into());
@@ -137,7 +149,7 @@ fn block_words(lexer: &mut Lexer, dialect: &Dialect) -> Outcome<Vec<Word>> {
     while !lexer.at_end() {
         let start = lexer.position();
         let behind_digit = lexer.is_behind_digit();
-        let kind = WordParser { lexer, dialect, start, first: found.is_empty(), behind_digit }.word()?;
+        let kind = WordParser { lexer, dialect, start, behind_digit }.word()?;
         found.push(Word { columns: lexer.columns_from(start), kind });
     }
     Ok(found)
@@ -148,7 +160,6 @@ struct WordParser<'l, 'a, 'd> {
     lexer: &'l mut Lexer<'a>,
     dialect: &'d Dialect,
     start: usize,
-    first: bool,
     /// The byte before it is a digit or a point.
     behind_digit: bool,
 }
@@ -324,12 +335,9 @@ impl<'a> WordParser<'_, 'a, '_> {
             b'K' => Address::Centre(2),
             b'H' => Address::H,
             b'L' | b'P' => {
-                return Err(Fault::new(
-                    codes::NO_SUBPROGRAMS,
-                    self.columns(),
-                    "calls of sub-programs are not built yet",
-                )
-                .label("a sub-program call"));
+                return Err(Fault::new(codes::BAD_BLOCK, self.columns(), "the call of a sub-program stands alone")
+                    .label("not here")
+                    .help("write it into a block of its own, with P behind it: L12 P3"));
             }
             b'N' => {
                 return Err(Fault::new(
@@ -510,18 +518,15 @@ impl<'a> WordParser<'_, 'a, '_> {
 
     fn unknown_word(&mut self, name: &str, columns: Columns) -> Box<Fault> {
         let help = missing_equals_sign(name).or_else(|| words::did_you_mean(name));
-        let is_call = self.first && (self.lexer.peek() == Token::Symbol("(") || self.lexer.at_end());
-        if is_call && help.is_none() {
-            return Fault::new(
-                codes::NO_SUBPROGRAMS,
-                columns,
-                format!("`{name}` looks like a sub-program: their calls are not built yet"),
-            )
-            .label("not a word of the language");
-        }
+        let is_call = self.lexer.peek() == Token::Symbol("(");
+        let otherwise = if is_call {
+            "a sub-program is called in a block of its own".to_owned()
+        } else {
+            format!("an assignment needs `=`: {name}=...")
+        };
         Fault::new(codes::UNKNOWN_WORD, columns, format!("unknown word `{name}`"))
             .label("not a word of the language")
-            .maybe_help(help.or_else(|| (!is_call).then(|| format!("an assignment needs `=`: {name}=..."))))
+            .maybe_help(help.or(Some(otherwise)))
     }
 }
 

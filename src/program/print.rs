@@ -5,6 +5,7 @@
 //! the operators need them.
 
 use super::dialect::Dialect;
+use super::parser::is_synchronised;
 use super::syntax::{
     Address, AddressValue, Block, Case, DefinedVariable, Definition, Destination, Expr, ExprKind, ForLoop, Form,
     IndexedValue, Initial, Jump, Statement, SystemName, Target, Unary, VariableType, Word, WordKind,
@@ -25,9 +26,9 @@ pub fn print(block: &Block, dialect: &Dialect) -> String {
     printer.text
 }
 
-struct Printer<'d> {
+pub(super) struct Printer<'d> {
     dialect: &'d Dialect,
-    text: String,
+    pub(super) text: String,
 }
 
 impl Printer<'_> {
@@ -51,9 +52,11 @@ impl Printer<'_> {
             Statement::Words(words) => words.iter().for_each(|word| self.block_word(word)),
             Statement::Define(definition) => self.define(definition),
             Statement::If(condition) => self.with("IF", condition),
-            Statement::IfJump(condition, jump) => {
-                self.with("IF", condition);
-                self.jump(jump);
+            Statement::IfJump(branches) => {
+                for (condition, jump) in branches {
+                    self.with("IF", condition);
+                    self.jump(jump);
+                }
             }
             Statement::Else => self.word("ELSE"),
             Statement::EndIf => self.word("ENDIF"),
@@ -67,7 +70,22 @@ impl Printer<'_> {
             Statement::Until(condition) => self.with("UNTIL", condition),
             Statement::Jump(jump) => self.jump(jump),
             Statement::Case(case) => self.case(case),
-            Statement::NotActedOn(entry, _) => self.word(entry.word),
+            Statement::RepeatBlocks(repeat) => self.repeat_blocks(repeat),
+            Statement::Procedure(header) => self.header("PROC", header),
+            Statement::External(header) => self.header("EXTERN", header),
+            Statement::Call(call) => self.call(call),
+            Statement::ModalCall(call) => {
+                self.word("MCALL");
+                call.iter().for_each(|call| self.call(call));
+            }
+            Statement::CallPath(path) => self.call_path(path.as_ref()),
+            Statement::Return(wanted) => self.return_statement(wanted),
+            Statement::NotActedOn(entry, _) => {
+                if !is_synchronised(entry.word) {
+                    self.word("MCALL");
+                }
+                self.word(entry.word);
+            }
         }
     }
 
@@ -102,11 +120,14 @@ impl Printer<'_> {
             Direction::BothQuiet => "GOTOC",
             Direction::Start => "GOTOS",
         });
-        match &jump.destination {
-            None => {}
-            Some(Destination::Name(name)) => self.word(name),
-            Some(Destination::Number(number)) => self.word(&format!("N{number}")),
-            Some(Destination::Text(text)) => {
+        jump.destination.iter().for_each(|destination| self.destination(destination));
+    }
+
+    pub(super) fn destination(&mut self, destination: &Destination) {
+        match destination {
+            Destination::Name(name) => self.word(name),
+            Destination::Number(number) => self.word(&format!("N{number}")),
+            Destination::Text(text) => {
                 self.begin_word();
                 self.expression(text);
             }
@@ -277,7 +298,7 @@ impl Printer<'_> {
         }
     }
 
-    fn expression(&mut self, expression: &Expr) {
+    pub(super) fn expression(&mut self, expression: &Expr) {
         self.operand(expression, 0);
     }
 
@@ -374,7 +395,7 @@ impl Printer<'_> {
     }
 
     /// Values with commas between them; a gap is nothing.
-    fn list<T>(&mut self, values: &[Option<T>], print: impl Fn(&mut Self, &T)) {
+    pub(super) fn list<T>(&mut self, values: &[Option<T>], print: impl Fn(&mut Self, &T)) {
         for (index, value) in values.iter().enumerate() {
             if index > 0 {
                 self.text.push(',');
@@ -383,7 +404,7 @@ impl Printer<'_> {
         }
     }
 
-    fn with(&mut self, word: &str, expression: &Expr) {
+    pub(super) fn with(&mut self, word: &str, expression: &Expr) {
         self.word(word);
         self.begin_word();
         self.expression(expression);
@@ -393,18 +414,18 @@ impl Printer<'_> {
         self.word(spelling(role).unwrap_or_default());
     }
 
-    fn word(&mut self, word: &str) {
+    pub(super) fn word(&mut self, word: &str) {
         self.begin_word();
         self.text.push_str(word);
     }
 
-    fn begin_word(&mut self) {
+    pub(super) fn begin_word(&mut self) {
         if !self.text.is_empty() {
             self.text.push(' ');
         }
     }
 
-    fn put(&mut self, text: std::fmt::Arguments<'_>) {
+    pub(super) fn put(&mut self, text: std::fmt::Arguments<'_>) {
         // Writing to a String cannot fail.
         let _ = self.text.write_fmt(text);
     }

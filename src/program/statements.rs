@@ -3,8 +3,9 @@
 //! In: a [`Lexer`] behind the first word. Out: [`Statement`]. What stands behind the statement is the caller's business.
 //! Partners (IF and its ENDIF) are found by `structure`, not here.
 
+use super::calls;
 use super::codes::{self, Columns, Fault, Outcome};
-use super::expression::{arguments, expected, expression, indices, not_built};
+use super::expression::{arguments, expected, expression, indices};
 use super::lexer::{Lexer, Number, Token};
 use super::syntax::{
     Case, DefinedVariable, Definition, Destination, Direction, Expr, ExprKind, ForLoop, Initial, Jump, Statement,
@@ -18,20 +19,15 @@ pub const TEXT_MAX: u16 = 400;
 /// Longest name of a variable.
 const NAME_MAX: usize = 31;
 /// Dimensions of an array.
-const DIMENSIONS_MAX: usize = 3;
+pub(super) const DIMENSIONS_MAX: usize = 3;
+/// Jumps in one IF block.
+const BRANCHES_MAX: usize = 100;
 
 /// Reads the statement that `control` opens; its word stands at `columns`.
 pub fn statement(control: Control, lexer: &mut Lexer, columns: Columns) -> Outcome<Statement> {
     Ok(match control {
         Control::Define => Statement::Define(definition(lexer)?),
-        Control::Declaration => Statement::Words(Vec::new()),
-        Control::If => {
-            let condition = expression(lexer)?;
-            match jump_word(lexer) {
-                Some(direction) => Statement::IfJump(condition, jump(direction, lexer)?),
-                None => Statement::If(condition),
-            }
-        }
+        Control::If => if_statement(lexer)?,
         Control::Else => Statement::Else,
         Control::EndIf => Statement::EndIf,
         Control::For => Statement::For(Box::new(for_loop(lexer)?)),
@@ -41,11 +37,41 @@ pub fn statement(control: Control, lexer: &mut Lexer, columns: Columns) -> Outco
         Control::Loop => Statement::Loop,
         Control::EndLoop => Statement::EndLoop,
         Control::Repeat if lexer.at_end() => Statement::Repeat,
-        Control::Repeat => return Err(not_built("REPEAT label", "block repetition is not built yet", columns)),
+        Control::Repeat => calls::repeat_blocks(lexer, false)?,
+        Control::RepeatBlock => calls::repeat_blocks(lexer, true)?,
+        Control::Procedure => calls::procedure(lexer)?,
+        Control::External => calls::external(lexer)?,
+        Control::Return => calls::return_statement(lexer, columns)?,
+        Control::Call => calls::call_by_text(lexer)?,
+        Control::PathCall => calls::call_by_path(lexer)?,
+        Control::ModalCall => calls::modal_call(lexer)?,
+        Control::FileCall => calls::call_of_file(lexer)?,
+        Control::IsoCall => calls::iso_call(lexer, columns)?,
+        Control::CallPath => calls::call_path(lexer)?,
         Control::Until => Statement::Until(expression(lexer)?),
         Control::Jump(direction) => Statement::Jump(jump(direction, lexer)?),
         Control::Case => Statement::Case(Box::new(case(lexer)?)),
     })
+}
+
+/// IF condition, or IF condition GOTOF label, also several of these in one block: the first that is true leads away.
+fn if_statement(lexer: &mut Lexer) -> Outcome<Statement> {
+    let condition = expression(lexer)?;
+    let Some(direction) = jump_word(lexer) else { return Ok(Statement::If(condition)) };
+    let mut branches = vec![(condition, jump(direction, lexer)?)];
+    loop {
+        if let Some(direction) = jump_word(lexer) {
+            // IF a GOTOF b GOTOF c: what is reached is not under the condition.
+            let columns = lexer.columns_of_next();
+            branches.push((Expr { columns, kind: ExprKind::Bool(true) }, jump(direction, lexer)?));
+        } else if branches.len() < BRANCHES_MAX && keyword(lexer, "IF") {
+            let condition = expression(lexer)?;
+            let Some(direction) = jump_word(lexer) else { return Err(expected(lexer, "GOTOF or another jump")) };
+            branches.push((condition, jump(direction, lexer)?));
+        } else {
+            return Ok(Statement::IfJump(branches));
+        }
+    }
 }
 
 /// GOTOF and its kin, if one of them comes next.
@@ -65,12 +91,25 @@ fn jump(direction: Direction, lexer: &mut Lexer) -> Outcome<Jump> {
     if direction == Direction::Start {
         return Ok(Jump { direction, destination: None, columns: lexer.columns_of_next() });
     }
+    let destination = destination(lexer)?;
+    Ok(Jump { direction, destination: Some(destination), columns: lexer.columns_from(start) })
+}
+
+/// A label, `N90`, `:90`, or a text that is computed.
+pub(super) fn destination(lexer: &mut Lexer) -> Outcome<Destination> {
     let mut ahead = *lexer;
+    if ahead.peek_byte() == Some(b':') {
+        ahead.skip_byte();
+    }
     let destination = match ahead.token()? {
         Token::Number(Number::Int(number)) if number >= 0 => Destination::Number(u64::from(number.unsigned_abs())),
-        Token::Name(name) => match block_number(name) {
-            Some(number) => Destination::Number(number),
-            None => Destination::Name(name.to_ascii_uppercase().into()),
+        Token::Name(name) => match (block_number(name), ahead.peek()) {
+            (Some(number), _) => Destination::Number(number),
+            (None, Token::Symbol("<<" | "[" | "(")) => {
+                ahead = *lexer;
+                Destination::Text(expression(&mut ahead)?)
+            }
+            (None, _) => Destination::Name(name.to_ascii_uppercase().into()),
         },
         Token::Text(_) => {
             ahead = *lexer;
@@ -79,7 +118,7 @@ fn jump(direction: Direction, lexer: &mut Lexer) -> Outcome<Jump> {
         _ => return Err(expected(lexer, "a label or a block number")),
     };
     *lexer = ahead;
-    Ok(Jump { direction, destination: Some(destination), columns: lexer.columns_from(start) })
+    Ok(destination)
 }
 
 /// `N90` -> 90.
@@ -88,7 +127,7 @@ pub fn block_number(name: &str) -> Option<u64> {
     if digits.bytes().all(|byte| byte.is_ascii_digit()) { digits.parse().ok() } else { None }
 }
 
-fn keyword(lexer: &mut Lexer, word: &str) -> bool {
+pub(super) fn keyword(lexer: &mut Lexer, word: &str) -> bool {
     let mut ahead = *lexer;
     let found = ahead.name().is_some_and(|name| name.eq_ignore_ascii_case(word));
     if found {
@@ -177,7 +216,7 @@ fn attributes(lexer: &mut Lexer) -> Outcome<()> {
     Ok(())
 }
 
-fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
+pub(super) fn variable_type(lexer: &mut Lexer) -> Outcome<VariableType> {
     let before = *lexer;
     let name = lexer.name().unwrap_or_default().to_ascii_uppercase();
     Ok(match name.as_str() {
@@ -262,7 +301,7 @@ pub(super) fn initial(lexer: &mut Lexer) -> Outcome<Initial> {
 }
 
 /// Names of variables begin with two letters or underscores and are not words of the language.
-fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
+pub(super) fn check_name(name: &str, columns: &Columns) -> Outcome<()> {
     let letter = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';
     let starts_well = match name.as_bytes() {
         [first] => letter(*first),

@@ -3,7 +3,8 @@
 //! In: a [`ProgramSource`], scanned once, line heads only. Out: [`Structure`]: jumps and loops never rescan the file. Its size grows
 //! with labels and control words, not with lines. Block numbers are not kept (every line may have one): they are searched.
 
-use super::source::{Cursor, ProgramSource};
+use super::codes::Outcome;
+use super::source::{Cursor, ProgramSource, Window};
 use super::syntax::Direction;
 use super::words::{self, Control, Role};
 use std::collections::BTreeMap;
@@ -38,11 +39,13 @@ struct Open {
 
 impl Structure {
     /// Reads the heads of all lines.
-    pub(super) fn scan(source: &ProgramSource) -> Self {
+    pub(super) fn scan(source: &ProgramSource) -> Outcome<Self> {
         let mut structure = Self::default();
         let mut open: Vec<Open> = Vec::new();
         let mut cursor = source.first();
-        while let Some((line, next)) = source.line_bytes(cursor) {
+        let mut window = Window::default();
+        while let Some((line, next)) = source.line(&mut window, cursor)? {
+            let line = &*line;
             let (label, word) = head(line);
             if let Some(label) = label {
                 let label = String::from_utf8_lossy(label).to_ascii_uppercase();
@@ -56,7 +59,7 @@ impl Structure {
         while let Some(left) = open.pop() {
             structure.miss(left.control, left.cursor);
         }
-        structure
+        Ok(structure)
     }
 
     /// The line of the partner of the control word in `line`.
@@ -150,7 +153,7 @@ fn names(control: Control) -> (&'static str, &'static str) {
         Control::EndLoop => ("ENDLOOP", "LOOP"),
         Control::Repeat => ("REPEAT", "UNTIL"),
         Control::Until => ("UNTIL", "REPEAT"),
-        Control::Define | Control::Declaration | Control::Jump(_) | Control::Case => ("", ""),
+        _ => ("", ""),
     }
 }
 
@@ -167,6 +170,23 @@ pub fn number_of(line: &[u8]) -> Option<u64> {
         return None;
     }
     digits[..count].iter().try_fold(0_u64, |number, digit| number.checked_mul(10)?.checked_add(u64::from(digit - b'0')))
+}
+
+/// Skip level of a line, without decoding it: `/` and `/0` are level 0.
+pub fn skip_level_of(line: &[u8]) -> Option<u8> {
+    let mut at = blanks(line);
+    if line.get(at) != Some(&b'/') {
+        // The level may stand behind the block number.
+        number_of(line)?;
+        at += 1 + blanks(&line[at + 1..]);
+        at += line[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+        at += blanks(&line[at..]);
+    }
+    if line.get(at) != Some(&b'/') {
+        return None;
+    }
+    let digit = line.get(at + 1).filter(|byte| byte.is_ascii_digit());
+    Some(digit.map_or(0, |digit| digit - b'0'))
 }
 
 /// Label and first word of a line.
@@ -219,10 +239,9 @@ fn structural(word: &[u8], line: &[u8]) -> Option<Control> {
     }
     let Some(Role::Control(control)) = std::str::from_utf8(word).ok().and_then(words::role) else { return None };
     match control {
-        Control::Define | Control::Declaration | Control::Jump(_) | Control::Case => None,
         Control::If if has_jump(line) => None,
         Control::Repeat if !repeat_stands_alone(line) => None,
-        control => Some(control),
+        control => (!names(control).0.is_empty()).then_some(control),
     }
 }
 

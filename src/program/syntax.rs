@@ -3,6 +3,7 @@
 //! In: nothing (plain data). Out: [`Block`], [`Statement`], [`Word`], [`Expr`]. Columns are bytes of the decoded line; a block does
 //! not know its line. Nothing here is evaluated.
 
+pub use super::call_syntax::{Call, Callee, Header, Parameter, RepeatBlocks, Return};
 use super::codes::Columns;
 use super::words::{Function, GFunction, IndexedAddress, Keyword, NotActedOn, Procedure};
 use crate::base::AxisId;
@@ -41,8 +42,8 @@ pub enum Statement {
     Define(Definition),
     /// IF ... (to ELSE or ENDIF).
     If(Expr),
-    /// IF ... GOTOF ...
-    IfJump(Expr, Jump),
+    /// IF ... GOTOF ..., also several in one block: the first that is true leads away.
+    IfJump(Vec<(Expr, Jump)>),
     /// ELSE.
     Else,
     /// ENDIF.
@@ -67,6 +68,20 @@ pub enum Statement {
     Jump(Jump),
     /// CASE ... OF ... DEFAULT.
     Case(Box<Case>),
+    /// REPEAT label, REPEATB label.
+    RepeatBlocks(Box<RepeatBlocks>),
+    /// PROC.
+    Procedure(Arc<Header>),
+    /// EXTERN.
+    External(Arc<Header>),
+    /// A call of a sub-program.
+    Call(Box<Call>),
+    /// MCALL; `None` ends it.
+    ModalCall(Option<Arc<Call>>),
+    /// CALLPATH: a folder to search; `None` forgets it.
+    CallPath(Option<Expr>),
+    /// RET.
+    Return(Box<Return>),
     /// A whole line that is known but not acted on (synchronised actions).
     NotActedOn(&'static NotActedOn, Columns),
 }

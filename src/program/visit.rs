@@ -4,8 +4,8 @@
 
 use super::codes::Columns;
 use super::syntax::{
-    Binary, Case, Definition, Destination, Expr, ExprKind, IndexedValue, Initial, Jump, Statement, SystemName, Target,
-    Word, WordKind,
+    Binary, Call, Callee, Case, Definition, Destination, Expr, ExprKind, IndexedValue, Initial, Jump, Statement,
+    SystemName, Target, Word, WordKind,
 };
 use super::system_variables::SystemVariable;
 
@@ -17,9 +17,19 @@ pub fn visit_expressions(statement: &Statement, visit: &mut impl FnMut(&Expr)) {
         Statement::If(condition) | Statement::While(condition) | Statement::Until(condition) => {
             visit_expression(condition, visit);
         }
-        Statement::IfJump(condition, jump) => {
-            visit_expression(condition, visit);
-            visit_jump(jump, visit);
+        Statement::IfJump(branches) => {
+            for (condition, jump) in branches {
+                visit_expression(condition, visit);
+                visit_jump(jump, visit);
+            }
+        }
+        Statement::Call(call) => visit_call(call, visit),
+        Statement::ModalCall(Some(call)) => visit_call(call, visit),
+        Statement::CallPath(path) => path.iter().for_each(|path| visit_expression(path, visit)),
+        Statement::RepeatBlocks(repeat) => repeat.passes.iter().for_each(|passes| visit_expression(passes, visit)),
+        Statement::Return(wanted) => {
+            let given = [&wanted.target, &wanted.behind, &wanted.levels, &wanted.from_start];
+            given.into_iter().flatten().for_each(|value| visit_expression(value, visit));
         }
         Statement::For(for_loop) => {
             visit_target(&for_loop.counter, visit);
@@ -118,6 +128,13 @@ fn visit_case(case: &Case, visit: &mut impl FnMut(&Expr)) {
         visit_jump(jump, visit);
     }
     case.default.iter().for_each(|jump| visit_jump(jump, visit));
+}
+
+fn visit_call(call: &Call, visit: &mut impl FnMut(&Expr)) {
+    if let Callee::Text(name) = &call.callee {
+        visit_expression(name, visit);
+    }
+    call.arguments.iter().flatten().chain(&call.passes).for_each(|value| visit_expression(value, visit));
 }
 
 fn visit_jump(jump: &Jump, visit: &mut impl FnMut(&Expr)) {

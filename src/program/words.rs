@@ -75,8 +75,6 @@ pub enum Keyword {
     Compressor(Compressor),
     /// STOPRE.
     StopPreparation,
-    /// RET.
-    Return,
 }
 
 /// Words of the programmable frame.
@@ -300,8 +298,26 @@ pub enum Procedure {
 pub enum Control {
     /// DEF.
     Define,
-    /// PROC, EXTERN: declarations, without effect until sub-programs are built.
-    Declaration,
+    /// PROC.
+    Procedure,
+    /// EXTERN.
+    External,
+    /// RET.
+    Return,
+    /// CALL.
+    Call,
+    /// PCALL.
+    PathCall,
+    /// MCALL.
+    ModalCall,
+    /// EXTCALL.
+    FileCall,
+    /// ISOCALL: refused.
+    IsoCall,
+    /// CALLPATH.
+    CallPath,
+    /// REPEATB.
+    RepeatBlock,
     /// IF.
     If,
     /// ELSE.
@@ -407,8 +423,8 @@ impl Function {
             Self::Substr => (2, 3),
             Self::Bound => (3, 3),
             Self::Sprint => (1, 11),
-            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (2, 16),
-            Self::Cmirror => (1, 8),
+            Self::Ctrans | Self::Cfine | Self::Crot | Self::Crots | Self::Cscale => (0, 16),
+            Self::Cmirror => (0, 8),
             _ => (1, 1),
         }
     }
@@ -700,7 +716,6 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("SETAL", Role::Procedure(Procedure::RaiseAlarm)),
     ("CYCLE832", Role::Procedure(Procedure::HighSpeedSettings)),
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
-    ("RET", Role::Keyword(Keyword::Return)),
     ("CR", Role::Address(Address::Radius)),
     ("TURN", Role::Address(Address::Turn)),
     ("ADIS", Role::Address(Address::RoundingDistance)),
@@ -729,8 +744,16 @@ const ACTED_ON: &[(&str, Role)] = &[
     ("OVRRAP", Role::Address(Address::RapidOverride)),
     ("MSG", Role::Message),
     ("DEF", Role::Control(Control::Define)),
-    ("PROC", Role::Control(Control::Declaration)),
-    ("EXTERN", Role::Control(Control::Declaration)),
+    ("PROC", Role::Control(Control::Procedure)),
+    ("EXTERN", Role::Control(Control::External)),
+    ("RET", Role::Control(Control::Return)),
+    ("CALL", Role::Control(Control::Call)),
+    ("PCALL", Role::Control(Control::PathCall)),
+    ("MCALL", Role::Control(Control::ModalCall)),
+    ("EXTCALL", Role::Control(Control::FileCall)),
+    ("ISOCALL", Role::Control(Control::IsoCall)),
+    ("CALLPATH", Role::Control(Control::CallPath)),
+    ("REPEATB", Role::Control(Control::RepeatBlock)),
     ("IF", Role::Control(Control::If)),
     ("ELSE", Role::Control(Control::Else)),
     ("ENDIF", Role::Control(Control::EndIf)),

@@ -147,7 +147,7 @@ impl Recording {
         let numbered = programs.zip(0..=u16::MAX);
         numbered
             .map(|(info, id)| {
-                let bytes = Arc::from(self.attachment(info)?);
+                let bytes = self.attachment(info)?.into();
                 Ok(OpenedProgram { id: ProgramId(id), name: Arc::from(info.name.as_str()), bytes })
             })
             .collect()

@@ -7,11 +7,11 @@ use super::choice::SignalChoice;
 use super::schema::{AXIS_FIELDS, RECORDING_FORMAT};
 use crate::base::AxisKind;
 use crate::machine::{Axis, Machine};
-use crate::program::OpenedProgram;
+use crate::program::{OpenedProgram, ProgramText};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::io;
 use std::num::NonZeroU32;
-use std::sync::Arc;
 
 /// Metadata record with version, machine and program.
 pub const ABOUT_METADATA: &str = "sollwert";
@@ -82,19 +82,19 @@ impl<'a> RecordingSetup<'a> {
     }
 
     /// The metadata records that stand before the first message, in order.
-    pub(super) fn metadata(&self) -> Vec<(&'static str, BTreeMap<String, String>)> {
+    pub(super) fn metadata(&self) -> io::Result<Vec<(&'static str, BTreeMap<String, String>)>> {
         let mut inputs = BTreeMap::new();
-        inputs.insert(self.machine_file_name.to_owned(), sha256(self.machine_text.as_bytes()));
+        inputs.insert(self.machine_file_name.to_owned(), hexadecimal(Sha256::digest(self.machine_text.as_bytes())));
         for program in self.programs {
-            inputs.insert(program.name.to_string(), sha256(&program.bytes));
+            inputs.insert(program.name.to_string(), sha256(&program.bytes)?);
         }
-        vec![
+        Ok(vec![
             (ABOUT_METADATA, self.about()),
             (CYCLE_METADATA, self.cycle()),
             (AXES_METADATA, self.axes()),
             (UNITS_METADATA, self.units()),
             (INPUTS_METADATA, inputs),
-        ]
+        ])
     }
 
     fn about(&self) -> BTreeMap<String, String> {
@@ -185,8 +185,8 @@ impl<'a> RecordingSetup<'a> {
 }
 
 /// Metadata of a program that is opened while the run goes on.
-pub(super) fn input_metadata(name: &Arc<str>, bytes: &[u8]) -> BTreeMap<String, String> {
-    BTreeMap::from([(name.to_string(), sha256(bytes))])
+pub(super) fn input_metadata(program: &OpenedProgram) -> io::Result<BTreeMap<String, String>> {
+    Ok(BTreeMap::from([(program.name.to_string(), sha256(&program.bytes)?)]))
 }
 
 fn kind_name(kind: AxisKind) -> &'static str {
@@ -205,7 +205,17 @@ fn drive_standing(axis: &Axis) -> &'static str {
     }
 }
 
-/// Lower-case hexadecimal.
-fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+/// Of a text that may be on the disk.
+fn sha256(text: &ProgramText) -> io::Result<String> {
+    let mut sum = Sha256::new();
+    text.pass(0, |bytes| {
+        sum.update(bytes);
+        true
+    })?;
+    Ok(hexadecimal(sum.finalize()))
+}
+
+/// In lower case.
+fn hexadecimal(bytes: impl IntoIterator<Item = u8>) -> String {
+    bytes.into_iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -19,7 +19,7 @@ use super::target::Target;
 use crate::base::{AxisKind, Diagnostic, PerAxis, Tick, TimeBase};
 use crate::program::OpenedProgram;
 use crossbeam_channel::{Receiver, Sender};
-use mcap::records::{MessageHeader, Metadata};
+use mcap::records::{AttachmentHeader, MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{Attachment, McapError, McapResult, WriteOptions};
 use std::borrow::Cow;
@@ -183,9 +183,8 @@ impl RecordingWriter {
                 self.run_encoder.add_program(program.id, &program.name);
                 let time_ns = self.time_ns;
                 self.chunk_bytes = 0;
-                return attach_program(&mut self.mcap, program, time_ns).and_then(|()| {
-                    write_metadata(&mut self.mcap, INPUTS_METADATA, input_metadata(&program.name, &program.bytes))
-                });
+                attach_program(&mut self.mcap, program, time_ns)?;
+                return write_metadata(&mut self.mcap, INPUTS_METADATA, input_metadata(program)?);
             }
         };
         let Some(channel) = channel else { return Ok(()) };
@@ -251,20 +250,28 @@ fn write_prelude(mcap: &mut mcap::Writer<NoSeek<Target>>, setup: &RecordingSetup
         media_type: MACHINE_MEDIA_TYPE.to_owned(),
         data: Cow::Borrowed(setup.machine_text.as_bytes()),
     })?;
-    for (name, metadata) in setup.metadata() {
+    for (name, metadata) in setup.metadata()? {
         write_metadata(mcap, name, metadata)?;
     }
     mcap.flush()
 }
 
+/// Stretch by stretch: a program may be larger than the memory.
 fn attach_program(mcap: &mut mcap::Writer<NoSeek<Target>>, program: &OpenedProgram, time_ns: u64) -> McapResult<()> {
-    mcap.attach(&Attachment {
+    let header = AttachmentHeader {
         log_time: time_ns,
         create_time: 0,
         name: program.name.to_string(),
         media_type: PROGRAM_MEDIA_TYPE.to_owned(),
-        data: Cow::Borrowed(&program.bytes),
-    })
+    };
+    mcap.start_attachment(program.bytes.length() as u64, header)?;
+    let mut written = Ok(());
+    program.bytes.pass(0, |bytes| {
+        written = mcap.put_attachment_bytes(bytes);
+        written.is_ok()
+    })?;
+    written?;
+    mcap.finish_attachment()
 }
 
 fn write_metadata(

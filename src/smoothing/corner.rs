@@ -1,15 +1,26 @@
 //! What happens where two blocks meet.
 //!
-//! In: the two blocks and the machine's `[smoothing]`. Out: [`Junction`]: pass, stop, or a blend with its T and epsilon
-//! (models/local-smoothing.md section 1) [Essid 2019]. The path mode of the block that ends in the corner decides.
+//! In: the two blocks and the machine's `[smoothing]`. Out: [`Junction`]: pass, stop, or a blend with its T and epsilon. The path
+//! mode of the block that ends in the corner decides:
 //!
-//! G642 rounds within the contour tolerance. G641 rounds with the same curve, which begins at most the rounding distance before
-//! the corner: the control does not specify the shape there. G643, G644 and G645 round as G642 until they have shapes of their own.
+//! | mode | where | how far | curve |
+//! |---|---|---|---|
+//! | G64 | nowhere | | |
+//! | G641 | corners | ADIS or ADISPOS of both blocks | as G642 |
+//! | G642 | corners | beta times CTOL, no axis further than its ATOL | models/local-smoothing.md section 1 [Essid 2019] |
+//! | G643 | corners | every axis over its own range, as its ATOL or CTOL allows | polynomials, one range an axis |
+//! | G644 | corners | as far as the machine's axis tolerance allows, CTOL and ATOL do not count | one polynomial |
+//! | G645 | as G642, and tangential joints with a step of curvature | there: `transition_tolerance_mm` | as G642; a polynomial |
+//!
+//! Where an arc, another curve or a rotary axis takes part, a polynomial takes the place of the published blend; rotary axes keep
+//! OTOL. G643 has one range for all axes there. A blend never takes more than half of a block. Between two rapids G642, G643 and
+//! G645 have their tolerances times STOLF; next to one rapid they do not.
 //!
 //! Does not cut the blocks: that is the smoother's.
 
 use super::Corner;
-use crate::base::{AxisVector, PerAxis};
+use super::transition::{Pair, Tolerances, Transition, common, per_axis};
+use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Curve, DISPLACEMENT_MIN_LU, HermiteBlend, Line};
 use crate::interpreter::{Feed, Modes};
 use crate::machine::{Machine, PathMode, SmoothingSettings};
@@ -25,10 +36,15 @@ const REVERSAL_COS_MIN: f64 = 0.01;
 /// Direction cosines below this are rounding of coordinates: such an axis neither moves nor reverses.
 const DIRECTION_MIN_RATIO: f64 = 1e-9;
 
+/// Steps of curvature below this are none: a radius of a kilometre beside a line.
+const CURVATURE_STEP_MIN_PER_MM: f64 = 1e-6;
+
 /// One of the two blocks at a junction.
 pub(super) struct Side<'a> {
     /// The whole block as programmed.
     pub curve: &'a Curve,
+    /// Taken from its start already.
+    pub head_lu: f64,
     pub feed: &'a Feed,
     pub modes: &'a Modes,
 }
@@ -39,21 +55,12 @@ pub(super) struct Side<'a> {
 pub(super) enum Junction {
     /// Continuous path, geometry unchanged.
     Pass,
-    /// As `Pass`, but the program asked for a blend.
-    Unrounded(Reason),
+    /// As `Pass`, but the program asked for a blend, and there is no curve that keeps the tolerance.
+    Unrounded,
     /// The path rests here.
     Stop,
     /// A blend takes the place of both blocks' ends.
-    Blend(HermiteBlend, Corner),
-}
-
-/// Why a corner is not rounded although the program asks for it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reason {
-    /// One of the blocks is an arc.
-    Arc,
-    /// One of the blocks moves a rotary axis.
-    Rotary,
+    Blend(Curve, Corner),
 }
 
 /// The rules for junctions of one machine.
@@ -73,8 +80,8 @@ impl Rules {
         &self.linear
     }
 
-    /// The junction between two blocks. `free_mm` is what is left of the first one behind a blend at its own start.
-    pub(super) fn junction(&self, before: &Side<'_>, after: &Side<'_>, free_mm: f64) -> Junction {
+    /// The junction between two blocks. `free_lu` is what is left of the first one behind a blend at its own start.
+    pub(super) fn junction(&self, before: &Side<'_>, after: &Side<'_>, free_lu: f64) -> Junction {
         let mode = before.modes.path_mode;
         // The path parameter changes from mm to rad or back: no speed is common to both blocks but 0.
         let unit_changes = before.curve.rotary_only() != after.curve.rotary_only();
@@ -86,55 +93,216 @@ impl Rules {
         if mode == PathMode::G64 || !measurable {
             return Junction::Pass;
         }
-        let wanted_mm = self.wanted_mm(before, after);
-        let angle_rad = turning_angle(&before.curve.at(f64::INFINITY).first, &after.curve.at(0.0).first);
-        // A tolerance or distance of 0 is G64. A NaN is no corner.
-        if !(wanted_mm > 0.0 && angle_rad >= CORNER_ANGLE_MIN_RAD) {
+        let (u, v) = (before.curve.at(f64::INFINITY), after.curve.at(0.0));
+        let angle_rad = turning_angle(&u.first, &v.first);
+        let half_lu = 0.5 * before.curve.length_lu().min(after.curve.length_lu());
+        let room = Room { half_lu, free_lu };
+        if !(angle_rad >= CORNER_ANGLE_MIN_RAD) {
+            // Between two lines there is nothing to do; a compressed stretch has been made smooth.
+            let smooth = |curve: &Curve| matches!(curve, Curve::Line(_) | Curve::Polynomial(_));
+            let step = (v.second - u.second).masked(&self.linear).norm();
+            if mode != PathMode::G645
+                || (smooth(before.curve) && smooth(after.curve))
+                || !(step > CURVATURE_STEP_MIN_PER_MM)
+                || before.curve.end() != after.curve.start()
+            {
+                return Junction::Pass;
+            }
+            let tolerances = self.tolerances(self.settings.transition_tolerance_mm, before.modes, 1.0);
+            return self.polynomial(before, after, angle_rad, &room, &tolerances).unwrap_or(Junction::Pass);
+        }
+        // A tolerance or distance of 0 is G64.
+        if !(self.wanted_lu(before, after, &u.first, &v.first) > 0.0) {
             return Junction::Pass;
         }
-        let (Curve::Line(first), Curve::Line(second)) = (before.curve, after.curve) else {
-            return Junction::Unrounded(Reason::Arc);
-        };
-        if self.moves_rotary(first) || self.moves_rotary(second) {
-            return Junction::Unrounded(Reason::Rotary);
-        }
-        if (angle_rad / 2.0).cos() < REVERSAL_COS_MIN {
+        if self.turns_back(before.curve, &u.first, &v.first) {
             return Junction::Stop;
         }
-        let half_mm = 0.5 * first.length_lu().min(second.length_lu());
-        let mut t = wanted_mm.min(half_mm).min(free_mm);
-        // Blocks of equal length lose both halves but for a rounding error: no curve may be left that is shorter than any motion.
-        if free_mm - t < DISPLACEMENT_MIN_LU {
-            t = free_mm;
-        }
-        self.blend([first, second], angle_rad, t)
+        let lines = match (before.curve, after.curve) {
+            (Curve::Line(first), Curve::Line(second)) => Some([first, second]),
+            _ => None,
+        };
+        let linear_only = lines.filter(|lines| !lines.iter().any(|line| self.moves_rotary(line)));
+        // An axis that POSA has sent elsewhere is on its way: no polynomial can follow it.
+        let apart = before.curve.end() != after.curve.start();
+        let joined = match (mode, lines, linear_only) {
+            (PathMode::G643 | PathMode::G644, ..) | (_, _, None) if apart => Some(Junction::Pass),
+            (PathMode::G643, Some(lines), _) => self.block_internal(lines, before, after, angle_rad, &room),
+            (PathMode::G644, ..) => {
+                let tolerances = self.machine_tolerances();
+                self.polynomial(before, after, angle_rad, &room, &tolerances)
+            }
+            (_, _, Some(lines)) => Some(self.published(lines, before, after, angle_rad, &room)),
+            _ => self.general(before, after, angle_rad, &room, [&u.first, &v.first]),
+        };
+        joined.unwrap_or(Junction::Unrounded)
     }
 
-    fn blend(&self, [first, second]: [&Line; 2], angle_rad: f64, transition_length_mm: f64) -> Junction {
-        let (t, alpha) = (transition_length_mm, self.settings.alpha_ratio);
-        let [u, v] = [first, second].map(|line| line.direction().masked(&self.linear));
-        let Some(blend) = HermiteBlend::new(first.end(), &u, &v, t, alpha) else { return Junction::Pass };
+    /// The published blend.
+    fn published(
+        &self,
+        lines: [&Line; 2],
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+    ) -> Junction {
+        let [u, v] = lines.map(|line| line.direction().masked(&self.linear));
+        let alpha = self.settings.alpha_ratio;
+        let t = room.clamped(self.wanted_lu(before, after, &u, &v));
+        let Some(blend) = HermiteBlend::new(lines[0].end(), &u, &v, t, alpha) else { return Junction::Pass };
         // Of the clamped T, so that the tolerance only gets smaller.
         let tolerance_mm = 0.25 * t * (4.0 - alpha) * (angle_rad / 2.0).sin();
-        Junction::Blend(blend, Corner { angle_rad, tolerance_mm, transition_length_mm: t })
+        Junction::Blend(Curve::Blend(blend), Corner { angle_rad, tolerance_mm, transition_length_mm: t })
     }
 
-    /// T before clamping.
-    fn wanted_mm(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
-        if before.modes.path_mode == PathMode::G641 {
-            return self.rounding_distance_mm(before, after);
+    /// G643 between lines.
+    fn block_internal(
+        &self,
+        lines: [&Line; 2],
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+    ) -> Option<Junction> {
+        let tolerances = self.axis_tolerances(before, after);
+        let t_max_lu = room.clamped(f64::INFINITY);
+        let blend = per_axis(lines, t_max_lu, &tolerances, &self.linear, |t| cuts(before, after, t, room.free_lu))?;
+        Some(blended(blend, angle_rad))
+    }
+
+    /// G641, G642, G643 and G645 where an arc, another curve or a rotary axis takes part.
+    fn general(
+        &self,
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+        [u, v]: [&AxisVector; 2],
+    ) -> Option<Junction> {
+        let none = Tolerances { contour_mm: f64::INFINITY, axis_lu: PerAxis::splat(f64::INFINITY) };
+        match before.modes.path_mode {
+            PathMode::G641 => {
+                let distance = room.up_to(self.rounding_distance_mm(before, after));
+                self.polynomial(before, after, angle_rad, &distance, &none)
+            }
+            PathMode::G643 => {
+                let tolerances = Tolerances { axis_lu: self.axis_tolerances(before, after), ..none };
+                self.polynomial(before, after, angle_rad, room, &tolerances)
+            }
+            _ => {
+                let contour_mm = self.beta(u, v) * self.contour_tolerance_mm(before, after);
+                let tolerances = self.tolerances(contour_mm, before.modes, self.rapid_factor(before, after));
+                self.polynomial(before, after, angle_rad, room, &tolerances)
+            }
         }
-        let [u, v] =
-            [before.curve.at(f64::INFINITY).first, after.curve.at(0.0).first].map(|first| first.masked(&self.linear));
-        let beta =
-            if reverses(&u, &v) { self.settings.tolerance_reversal_ratio } else { self.settings.tolerance_ratio };
-        let epsilon = beta * self.contour_tolerance_mm(before);
-        // |V - U| = 2 sin(theta/2); a straight joint gives an infinite T, and is no corner.
-        8.0 * epsilon / ((4.0 - self.settings.alpha_ratio) * (v - u).norm())
     }
 
-    fn contour_tolerance_mm(&self, before: &Side<'_>) -> f64 {
-        before.modes.contour_tolerance_mm.unwrap_or(self.settings.contour_tolerance_mm)
+    fn polynomial(
+        &self,
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+        tolerances: &Tolerances,
+    ) -> Option<Junction> {
+        let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
+        let t_max_lu = room.clamped(f64::INFINITY);
+        let blend = common(&pair, t_max_lu, tolerances, |t| cuts(before, after, t, room.free_lu))?;
+        Some(blended(blend, angle_rad))
+    }
+
+    /// T of the published blend before it is cut to the room that there is; 0 where nothing is to be rounded.
+    fn wanted_lu(&self, before: &Side<'_>, after: &Side<'_>, u: &AxisVector, v: &AxisVector) -> f64 {
+        match before.modes.path_mode {
+            PathMode::G641 => self.rounding_distance_mm(before, after),
+            PathMode::G643 if self.contour_tolerance_mm(before, after) > 0.0 => f64::INFINITY,
+            PathMode::G643 => 0.0,
+            PathMode::G644 => f64::INFINITY,
+            _ => {
+                let [u, v] = [u.masked(&self.linear), v.masked(&self.linear)];
+                let epsilon = self.beta(&u, &v) * self.contour_tolerance_mm(before, after);
+                // |V - U| = 2 sin(theta/2); a straight joint gives an infinite T, and is no corner.
+                let shape = 4.0 - self.settings.alpha_ratio;
+                let t = 8.0 * epsilon / (shape * (v - u).norm());
+                let Some(limits) = &before.modes.programmed else { return t };
+                // ATOL of an axis: its share of the deviation in the middle.
+                let factor = self.rapid_factor(before, after);
+                let turns = (v - u).map(f64::abs);
+                let alone = limits.axis_tolerance_lu.as_slice().iter().zip(turns.as_slice());
+                alone.fold(t, |t, (tolerance, turn)| match tolerance {
+                    Some(tolerance) => t.min(8.0 * tolerance * factor / (shape * turn)),
+                    None => t,
+                })
+            }
+        }
+    }
+
+    fn beta(&self, u: &AxisVector, v: &AxisVector) -> f64 {
+        if reverses(&u.masked(&self.linear), &v.masked(&self.linear)) {
+            self.settings.tolerance_reversal_ratio
+        } else {
+            self.settings.tolerance_ratio
+        }
+    }
+
+    fn contour_tolerance_mm(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
+        let own = before.modes.contour_tolerance_mm.unwrap_or(self.settings.contour_tolerance_mm);
+        own * self.rapid_factor(before, after)
+    }
+
+    /// STOLF between two rapids.
+    fn rapid_factor(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
+        if !(*before.feed == Feed::Rapid && *after.feed == Feed::Rapid) {
+            return 1.0;
+        }
+        let programmed = before.modes.programmed.as_ref().and_then(|limits| limits.rapid_tolerance_ratio);
+        programmed.unwrap_or(self.settings.rapid_tolerance_ratio)
+    }
+
+    /// A contour tolerance, with ATOL of every axis and OTOL of the rotary ones.
+    fn tolerances(&self, contour_mm: f64, modes: &Modes, factor: f64) -> Tolerances {
+        let limits = modes.programmed.as_deref();
+        let rotary_rad = limits.and_then(|limits| limits.orientation_tolerance_rad);
+        let rotary_rad = rotary_rad.unwrap_or(self.settings.orientation_tolerance_rad);
+        let axis_lu = PerAxis::from_fn(|axis| match limits.and_then(|limits| limits.axis_tolerance_lu[axis]) {
+            Some(tolerance_lu) => tolerance_lu * factor,
+            None if self.linear[axis] => f64::INFINITY,
+            None => rotary_rad * factor,
+        });
+        Tolerances { contour_mm, axis_lu }
+    }
+
+    /// Tolerances of the compressor.
+    pub(super) fn own_tolerances(&self, modes: &Modes) -> Tolerances {
+        let contour_mm = modes.contour_tolerance_mm.unwrap_or(self.settings.contour_tolerance_mm);
+        self.tolerances(contour_mm, modes, 1.0)
+    }
+
+    /// MD20170.
+    pub(super) fn compressor_length_max_mm(&self) -> f64 {
+        self.settings.compressor_length_max_mm
+    }
+
+    /// SD42470.
+    pub(super) fn compressor_corner_rad(&self) -> f64 {
+        self.settings.compressor_corner_rad
+    }
+
+    /// Of every axis alone: ATOL, else CTOL or OTOL.
+    fn axis_tolerances(&self, before: &Side<'_>, after: &Side<'_>) -> PerAxis<f64> {
+        let contour_mm = self.contour_tolerance_mm(before, after);
+        let own = |tolerance_lu: f64| if tolerance_lu.is_finite() { tolerance_lu } else { contour_mm };
+        self.tolerances(contour_mm, before.modes, self.rapid_factor(before, after)).axis_lu.map(own)
+    }
+
+    /// Those of the machine, of every axis alone.
+    fn machine_tolerances(&self) -> Tolerances {
+        let settings = &self.settings;
+        let own = |linear: bool| {
+            if linear { settings.contour_tolerance_mm } else { settings.orientation_tolerance_rad }
+        };
+        Tolerances { contour_mm: f64::INFINITY, axis_lu: self.linear.map(own) }
     }
 
     /// ADISPOS between two rapids, else ADIS. A block's modes carry the one that is its own: next to one rapid, ADIS stands in
@@ -144,10 +312,65 @@ impl Rules {
         modes.rounding_distance_mm.or(self.settings.rounding_distance_mm).unwrap_or(0.0)
     }
 
+    /// The axes that count as path length turn back.
+    fn turns_back(&self, curve: &Curve, u: &AxisVector, v: &AxisVector) -> bool {
+        let counted = if curve.rotary_only() { self.linear.map(|is| !is) } else { self.linear };
+        let angle_rad = turning_angle(&u.masked(&counted), &v.masked(&counted));
+        (angle_rad / 2.0).cos() < REVERSAL_COS_MIN
+    }
+
     fn moves_rotary(&self, line: &Line) -> bool {
         let (start, end) = (line.start().0, line.end().0);
         start.masked(&self.linear.map(|is| !is)) != end.masked(&self.linear.map(|is| !is))
     }
+}
+
+/// What a blend may take of the blocks.
+struct Room {
+    /// Half of the shorter block.
+    half_lu: f64,
+    /// What is left of the first block.
+    free_lu: f64,
+}
+
+impl Room {
+    /// A wanted T, cut to the blocks.
+    fn clamped(&self, wanted_lu: f64) -> f64 {
+        let t = wanted_lu.min(self.half_lu).min(self.free_lu);
+        // Blocks of equal length lose both halves but for a rounding error: no curve may be left that is shorter than any motion.
+        if self.free_lu - t < DISPLACEMENT_MIN_LU { self.free_lu } else { t }
+    }
+
+    fn up_to(&self, wanted_lu: f64) -> Self {
+        Self { half_lu: self.half_lu.min(wanted_lu), ..*self }
+    }
+}
+
+/// Where the blocks are cut, to the last bit of the parts that are left.
+fn cuts(before: &Side<'_>, after: &Side<'_>, t_lu: f64, free_lu: f64) -> [PartPoint; 2] {
+    let length_lu = before.curve.length_lu();
+    let start = match before.curve {
+        // The blends take the whole block: this one begins where the last one ended.
+        curve if free_lu - t_lu <= 0.0 => {
+            if let Curve::Line(line) = curve {
+                line.shortened(before.head_lu, 0.0).start()
+            } else {
+                curve.trimmed(before.head_lu, length_lu).start()
+            }
+        }
+        Curve::Line(line) => line.shortened(0.0, t_lu).end(),
+        curve => curve.trimmed(0.0, length_lu - t_lu).end(),
+    };
+    let end = match after.curve {
+        Curve::Line(line) => line.shortened(t_lu, 0.0).start(),
+        curve => curve.trimmed(t_lu, curve.length_lu()).start(),
+    };
+    [start, end]
+}
+
+fn blended(blend: Transition, angle_rad: f64) -> Junction {
+    let Transition { curve, length_lu, deviation_mm } = blend;
+    Junction::Blend(curve, Corner { angle_rad, tolerance_mm: deviation_mm, transition_length_mm: length_lu })
 }
 
 /// Angle between two directions of any length: 2 atan2(|V - U|, |V + U|), exact near 0 and near 180 deg.

@@ -2,8 +2,11 @@
 //!
 //! In: [`Move`](crate::interpreter::Move)s in order. Out: [`ContourPiece`]s in order, streamed. Does not know speed.
 
+mod compressor;
 mod corner;
+mod insert;
 mod smoother;
+mod transition;
 mod unrounded;
 mod wire;
 

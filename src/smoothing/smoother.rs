@@ -1,21 +1,25 @@
 //! Joins moves to a contour, one at a time.
 //!
 //! In: [`Move`]s in order, pushed. Out: [`ContourPiece`]s in order: every motion block once (cut where blends take its ends), the
-//! blends, the waits. One motion block is held back, because the next one decides how it ends. Events of blocks without motion go
-//! to the next block; where none follows, to a wait at the end.
+//! blends, the waits. On its way a block passes three stages: what RND and CHF put between blocks (`insert`), the compressor
+//! (`compressor`), the junctions (`corner`). One motion block is held back, because the next one decides how it ends, and more where
+//! a corner is to be filled or blocks are compressed. Events of blocks without motion go to the next block; where none follows, to a
+//! wait at the end.
 //!
 //! Moves without displacement make no piece and no junction: their events and their count go to the next block. Displacement below
 //! [`DISPLACEMENT_MIN_LU`] is none; it is not lost, because the next block starts where the contour is.
 //!
 //! Does not decide how a corner is passed: that is `corner`.
 
+use super::compressor::Compression;
 use super::corner::{Junction, Rules, Side};
-use super::unrounded::Unrounded;
+use super::insert::{Inserted, Omitted, inserted};
+use super::unrounded::{Reason, Unrounded};
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, PartPoint, PerAxis};
-use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line};
-use crate::interpreter::{AxisPositioning, Event, Feed, Modes, Move, MoveKind, Positioning};
+use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, PolynomialCurve, SpatialArc};
+use crate::interpreter::{AxisPositioning, CornerInsert, Event, Feed, Modes, Move, MoveKind, Positioning};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 
@@ -24,6 +28,11 @@ use crate::program::BlockRef;
 pub struct Smoother {
     rules: Rules,
     position: PartPoint,
+    /// Where the last move ended: a move without motion that ends elsewhere has another tool.
+    told: PartPoint,
+    /// A block with RND, CHF or CHR at its end.
+    waiting: Option<Waiting>,
+    compression: Compression,
     held: Option<Held>,
     /// Blocks without motion that wait for the next piece; `block`, `feed` and `modes` are those of the last of them, for the
     /// case that no piece follows.
@@ -31,26 +40,40 @@ pub struct Smoother {
     unrounded: Unrounded,
     /// Axes that POSA has sent away: the program ends when they have arrived.
     positioned: PerAxis<bool>,
+    /// The block that did so last: what the wait at the end belongs to where nothing else is left.
+    sent_away: Option<Head>,
 }
 
 /// The motion block whose end is not decided yet.
 #[derive(Clone, Debug)]
-struct Held {
-    curve: Curve,
+pub(super) struct Held {
+    pub curve: Curve,
     /// Taken from its start by a blend.
-    head_lu: f64,
-    head: Head,
+    pub head_lu: f64,
+    pub head: Head,
 }
 
 /// What a piece says about its block.
 #[derive(Clone, Debug)]
-struct Head {
-    block: BlockRef,
-    feed: Feed,
-    modes: Modes,
-    events: Vec<Event>,
-    blocks_begun: u32,
+pub(super) struct Head {
+    pub block: BlockRef,
+    pub feed: Feed,
+    pub modes: Modes,
+    pub events: Vec<Event>,
+    pub blocks_begun: u32,
 }
+
+/// A block that waits for the one that leads away from its corner.
+#[derive(Clone, Debug)]
+struct Waiting {
+    held: Held,
+    insert: CornerInsert,
+    /// Blocks without motion since.
+    idle_blocks: u32,
+}
+
+/// More blocks without motion in the plane between two blocks leave their corner as it is.
+const IDLE_BLOCKS_MAX: u32 = 3;
 
 impl Smoother {
     /// At the machine's home posture, at rest.
@@ -62,16 +85,21 @@ impl Smoother {
         Self {
             rules: Rules::new(machine),
             position,
+            told: position,
+            waiting: None,
+            compression: Compression::default(),
             held: None,
             carried: None,
             unrounded: Unrounded::default(),
             positioned: PerAxis::splat(false),
+            sent_away: None,
         }
     }
 
     /// Takes the next move; hands over the pieces that it decides.
     pub fn push(&mut self, next: Move, out: &mut impl FnMut(ContourPiece)) {
         self.unrounded.watch(&next.events);
+        self.follow_tip(&next, out);
         let linear = self.rules.linear();
         match &next.kind {
             MoveKind::Rapid | MoveKind::Line => {
@@ -82,9 +110,13 @@ impl Smoother {
                 let arc = Arc::new(self.position, next.end, geometry, linear);
                 self.push_motion(next, Curve::Arc(arc), out);
             }
-            MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
-                let line = Line::new(self.position, next.end, linear);
-                self.push_motion(next, Curve::Line(line), out);
+            MoveKind::SpatialArc(geometry) => {
+                let arc = SpatialArc::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::SpatialArc(arc), out);
+            }
+            MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => {
+                let curve = PolynomialCurve::new(self.position, next.end, geometry, linear);
+                self.push_motion(next, Curve::Polynomial(curve), out);
             }
             MoveKind::Dwell { time_s } => {
                 let time_s = *time_s;
@@ -106,19 +138,31 @@ impl Smoother {
         }
     }
 
+    /// The axes stand and the tip of another tool is elsewhere: the path ends here and goes on there.
+    fn follow_tip(&mut self, next: &Move, out: &mut impl FnMut(ContourPiece)) {
+        let before = std::mem::replace(&mut self.told, next.end);
+        let stands = matches!(
+            next.kind,
+            MoveKind::Function { .. }
+                | MoveKind::Dwell { .. }
+                | MoveKind::WaitPositioned(_)
+                | MoveKind::StopPreparation
+        );
+        if stands && next.end != before {
+            self.rest(out);
+            self.position.0 += next.end.0 - before.0;
+        }
+    }
+
     /// The program ends here, or an alarm stops it: hands over what is held back, the last piece at rest. Pushing may go on.
     pub fn finish(&mut self, out: &mut impl FnMut(ContourPiece)) {
-        let last = self.held.as_ref().map(|held| Head { events: Vec::new(), blocks_begun: 0, ..held.head.clone() });
+        self.end_stages(out);
         self.rest(out);
         let carried = self.carried.take();
-        let waits = self.positioned.as_slice().contains(&true);
-        match carried.or(last.filter(|_| waits)) {
-            Some(head) if waits => {
-                let positioned = self.positioned;
-                out(self.wait_positioned(head, positioned));
-            }
-            Some(head) => out(self.wait(head, 0.0)),
-            None => {}
+        let positioned = self.positioned;
+        match self.sent_away.take().filter(|_| positioned.as_slice().contains(&true)) {
+            Some(sent_away) => out(self.wait_positioned(carried.unwrap_or(sent_away), positioned)),
+            None => carried.into_iter().for_each(|head| out(self.wait(head, 0.0))),
         }
     }
 
@@ -128,6 +172,9 @@ impl Smoother {
             self.positioned[axis.axis] = true;
             self.position.0[axis.axis] = axis.end_lu;
         }
+        let Move { block, feed, modes, .. } = &next;
+        let (feed, modes) = (feed.clone(), modes.clone());
+        self.sent_away = Some(Head { block: *block, feed, modes, events: Vec::new(), blocks_begun: 0 });
         let programmed = next.modes.programmed.clone();
         let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
         let mut events = next.events.clone();
@@ -155,7 +202,7 @@ impl Smoother {
         }
     }
 
-    fn push_motion(&mut self, next: Move, curve: Curve, out: &mut impl FnMut(ContourPiece)) {
+    fn push_motion(&mut self, mut next: Move, curve: Curve, out: &mut impl FnMut(ContourPiece)) {
         let length_lu = curve.length_lu();
         // A length that is no number goes on: feed makes an alarm of it. To leave it out would make the axes jump.
         if length_lu < DISPLACEMENT_MIN_LU {
@@ -166,7 +213,101 @@ impl Smoother {
             return;
         }
         self.position = next.end;
+        let corner = next.corner.take();
         let mut held = Held { curve, head_lu: 0.0, head: self.head(next, 1) };
+        if let Some(waiting) = self.waiting.take()
+            && !self.fill_corner(waiting, &mut held, corner.is_some(), out)
+        {
+            // The fillet takes the whole block: what it says goes to the next one.
+            self.carried = Some(held.head);
+            return;
+        }
+        match corner {
+            Some(insert) => self.waiting = Some(Waiting { held, insert: *insert, idle_blocks: 0 }),
+            None => self.compress(held, out),
+        }
+    }
+
+    /// Puts RND, CHF or CHR between two blocks. False: nothing is left of the second one.
+    fn fill_corner(
+        &mut self,
+        waiting: Waiting,
+        after: &mut Held,
+        corner_follows: bool,
+        out: &mut impl FnMut(ContourPiece),
+    ) -> bool {
+        let Waiting { held: mut before, insert, idle_blocks } = waiting;
+        let block = before.head.block;
+        let found = if idle_blocks > IDLE_BLOCKS_MAX {
+            Err(Omitted::Shape)
+        } else {
+            inserted(&before, after, &insert, corner_follows, self.rules.linear())
+        };
+        let Inserted { curve, tail_lu, head_lu, reduced } = match found {
+            Ok(inserted) => inserted,
+            Err(omitted) => {
+                if omitted != Omitted::NoCorner {
+                    self.unrounded.report(Reason::NoInsert, block);
+                }
+                self.compress(before, out);
+                return true;
+            }
+        };
+        if reduced {
+            self.unrounded.report(Reason::SmallInsert, block);
+        }
+        let feed = match (insert.feed_mm_s, &after.head.feed) {
+            (Some(feed_lu_s), _) => Feed::Path { feed_lu_s },
+            // The feed with which the block begins.
+            (None, Feed::Varying { feeds_lu_s }) => {
+                feeds_lu_s.first().map_or(Feed::Rapid, |first| Feed::Path { feed_lu_s: *first })
+            }
+            (None, feed) => feed.clone(),
+        };
+        let modes = before.head.modes.clone();
+        let mut head = Head { block, feed, modes, events: Vec::new(), blocks_begun: 0 };
+        let left_lu = before.curve.length_lu() - tail_lu;
+        if left_lu < DISPLACEMENT_MIN_LU {
+            head.events = before.head.events;
+            head.blocks_begun = before.head.blocks_begun;
+        } else {
+            before.curve = before.curve.trimmed(0.0, left_lu);
+            self.compress(before, out);
+        }
+        self.compress(Held { curve, head_lu: 0.0, head }, out);
+        let remains = after.curve.length_lu() - head_lu >= DISPLACEMENT_MIN_LU;
+        if remains {
+            after.curve = after.curve.trimmed(head_lu, f64::INFINITY);
+        }
+        remains
+    }
+
+    /// The corner that waits gets nothing.
+    fn leave_corner(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        if let Some(Waiting { held, .. }) = self.waiting.take() {
+            self.unrounded.report(Reason::NoInsert, held.head.block);
+            self.compress(held, out);
+        }
+    }
+
+    /// The next block, through the compressor.
+    fn compress(&mut self, block: Held, out: &mut impl FnMut(ContourPiece)) {
+        if self.compression.passes(&block) {
+            self.link(block, out);
+            return;
+        }
+        self.compression.push(block, &self.rules);
+        self.link_compressed(out);
+    }
+
+    fn link_compressed(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        while let Some(block) = self.compression.pop() {
+            self.link(block, out);
+        }
+    }
+
+    /// The next block as it is driven, but for its ends.
+    fn link(&mut self, mut held: Held, out: &mut impl FnMut(ContourPiece)) {
         if let Some(before) = self.held.take() {
             self.join(before, &mut held, out);
         }
@@ -179,8 +320,8 @@ impl Smoother {
         match self.rules.junction(&before.side(), &after.side(), free_lu) {
             Junction::Pass => out(before.whole(false)),
             Junction::Stop => out(before.whole(true)),
-            Junction::Unrounded(reason) => {
-                self.unrounded.report(reason, before.head.block);
+            Junction::Unrounded => {
+                self.unrounded.report(Reason::NoBlend, before.head.block);
                 out(before.whole(false));
             }
             Junction::Blend(blend, corner) => {
@@ -197,15 +338,26 @@ impl Smoother {
                     let start = before.shortened(0.0).start();
                     head.events = before.head.events.clone();
                     head.blocks_begun = before.head.blocks_begun;
-                    blend.starting_at(start)
+                    match blend {
+                        Curve::Blend(blend) => Curve::Blend(blend.starting_at(start)),
+                        other => other,
+                    }
                 };
-                out(head.piece(PieceKind::Blend(Curve::Blend(blend), corner), false));
+                out(head.piece(PieceKind::Blend(blend, corner), false));
             }
         }
     }
 
+    /// Hands over what waits for a corner or for the compressor.
+    fn end_stages(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        self.leave_corner(out);
+        self.compression.flush(&self.rules);
+        self.link_compressed(out);
+    }
+
     /// Ends the motion here.
     fn rest(&mut self, out: &mut impl FnMut(ContourPiece)) {
+        self.end_stages(out);
         if let Some(held) = self.held.take() {
             out(held.whole(true));
         }
@@ -222,6 +374,9 @@ impl Smoother {
     }
 
     fn carry(&mut self, next: Move, blocks: u32) {
+        if let Some(waiting) = &mut self.waiting {
+            waiting.idle_blocks += 1;
+        }
         let head = self.head(next, blocks);
         // A block that neither moves nor says anything leaves no trace.
         self.carried = (head.blocks_begun > 0 || !head.events.is_empty()).then_some(head);
@@ -245,7 +400,7 @@ impl Smoother {
 
 impl Held {
     fn side(&self) -> Side<'_> {
-        Side { curve: &self.curve, feed: &self.head.feed, modes: &self.head.modes }
+        Side { curve: &self.curve, head_lu: self.head_lu, feed: &self.head.feed, modes: &self.head.modes }
     }
 
     /// The block up to its programmed end.
@@ -272,7 +427,7 @@ impl Held {
 impl Head {
     fn piece(self, kind: PieceKind, stop_at_end: bool) -> ContourPiece {
         let Self { block, feed, modes, events, blocks_begun } = self;
-        ContourPiece { block, kind, feed, modes, events, blocks_begun, stop_at_end }
+        ContourPiece { block, kind, feed, modes, events, blocks_begun, block_length_lu: None, stop_at_end }
     }
 }
 

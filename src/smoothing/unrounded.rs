@@ -3,11 +3,21 @@
 //! In: program files as they are opened, blocks that end in such a corner. Out: one warning a reason, with the line marked. Does
 //! not change the contour.
 
-use super::corner::Reason;
 use crate::base::Diagnostic;
 use crate::base::diagnostics::Place;
 use crate::interpreter::Event;
 use crate::program::{BlockRef, OpenedProgram, ProgramSource};
+
+/// What the program asks for and does not get.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reason {
+    /// No blend of the corner keeps the tolerance.
+    NoBlend,
+    /// RND, CHF or CHR has no place there.
+    NoInsert,
+    /// RND, CHF or CHR is smaller than programmed.
+    SmallInsert,
+}
 
 /// Warnings not yet taken, and what has been said.
 #[derive(Clone, Debug, Default)]
@@ -33,13 +43,24 @@ impl Unrounded {
             return;
         }
         self.said.push(reason);
-        let (code, why) = match reason {
-            Reason::Arc => ("S0001", "one of its blocks is an arc"),
-            Reason::Rotary => ("S0002", "one of its blocks moves a rotary axis"),
+        let (code, what, help) = match reason {
+            Reason::NoBlend => (
+                "S0001",
+                "is passed as in G64: no blend keeps the tolerance there",
+                "reported once, for the first such corner",
+            ),
+            Reason::NoInsert => (
+                "S0004",
+                "stays as it is: there is no place for RND, CHF or CHR",
+                "both blocks must be lines or circles of the working plane, with at most 3 blocks between them and no stop; reported once, for the first such corner",
+            ),
+            Reason::SmallInsert => (
+                "S0005",
+                "gets a smaller RND, CHF or CHR: one of its blocks is too short",
+                "reported once, for the first such corner",
+            ),
         };
-        let message = format!("the corner at the end of line {} is passed as in G64, because {why}", block.line);
-        let help =
-            "corners between straight blocks of linear axes are rounded; reported once, for the first such corner";
+        let message = format!("the corner at the end of line {} {what}", block.line);
         let warning = Diagnostic::warning(code, message).help(help);
         self.warnings.push(match self.place(block) {
             Some(place) => warning.at(place),
@@ -55,9 +76,8 @@ impl Unrounded {
     /// The line of a block, marked.
     pub(super) fn place(&self, block: BlockRef) -> Option<Place> {
         let program = self.programs.iter().rev().find(|program| program.id == block.program)?;
-        let line = program.bytes.split(|byte| *byte == b'\n').nth((block.line as usize).checked_sub(1)?)?;
         let source = ProgramSource::from_bytes(&program.name, program.bytes.clone());
-        let line_text = source.decode(line).trim_end().to_owned();
+        let line_text = source.text_of_line(block.line)?.trim_end().to_owned();
         let columns = 0..line_text.len();
         Some(Place { file: program.name.clone(), line: block.line, line_text, columns, label: "ends here".to_owned() })
     }

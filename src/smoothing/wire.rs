@@ -23,6 +23,8 @@ pub struct ContourPiece {
     /// Motion blocks that begin at the start of this piece: 1 for a block, 0 for a blend or a wait, more where a block was
     /// consumed whole by its blends. The look-ahead window and the `blocks` figure count these.
     pub blocks_begun: u32,
+    /// Length of the block that this piece is one of several parts of; `None`: it is the whole block, or no part of one.
+    pub block_length_lu: Option<f64>,
     /// The path must be at rest at the end of this piece.
     pub stop_at_end: bool,
 }

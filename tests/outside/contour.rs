@@ -43,6 +43,11 @@ fn check(machine: &Machine, case: &str, run: &Replay) {
                 continue;
             }
             let (off, share) = element.distance(&row.q);
+            if let (Transition::Smooth, Some(after), true) = (end, after, share > 0.5 - 1e-6) {
+                let off = off.min(after.distance(&row.q).0);
+                assert!(off <= smooth_mm(machine, element), "{at}: {off} mm off the contour");
+                continue;
+            }
             assert!(off <= ON_CONTOUR_MM, "{at}: {off} mm off the block");
             assert!(share >= last_share - 1e-9 || element.arc.is_some(), "{at}: backwards on the block");
             last_share = share;
@@ -61,13 +66,26 @@ fn check(machine: &Machine, case: &str, run: &Replay) {
                 assert!(off <= chord_mm + 1e-9, "{at}: corner at {distance} mm, not at {}", blend.tolerance_mm);
             }
             Transition::Stop => rests(machine, &at, run, rows, &element.end),
-            Transition::Pass => {}
+            Transition::Pass | Transition::Smooth => {}
         }
         // What G641 takes begins at most ADIS before the corner; blends never take more than half of a block.
         let length_mm = element.length_mm(&linear);
         assert!(head_mm + tail_mm <= length_mm * (1.0 + 1e-9) || length_mm == 0.0, "{at}");
         head_mm = tail_mm;
     }
+}
+
+/// What a polynomial blend may be off the contour: CTOL (ADIS takes no more than it is long), and OTOL of two
+/// rotary axes.
+fn smooth_mm(machine: &Machine, element: &crate::replay::Element) -> f64 {
+    let (modes, smoothing) = (&element.modes, &machine.smoothing);
+    let linear_mm = match modes.path_mode {
+        PathMode::G641 => modes.rounding_distance_mm.unwrap_or(0.0),
+        _ => modes.contour_tolerance_mm.unwrap_or(smoothing.contour_tolerance_mm),
+    };
+    // ADIS says nothing of rotary axes.
+    let rotary_rad = if modes.path_mode == PathMode::G641 { 10.0 } else { 2.0 * smoothing.orientation_tolerance_rad };
+    linear_mm + rotary_rad
 }
 
 /// The path comes to rest in a point: within a cycle of it the motion is below what jerk makes of rest in that time.

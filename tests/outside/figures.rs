@@ -58,8 +58,11 @@ fn lengths(machine: &Machine, case: &str, run: &Replay) {
     let blocks: f64 = run.elements.values().map(|element: &Element| element.length_mm(&linear)).sum();
     let (mut low, high) = (blocks, blocks);
     for (_, transition) in transitions(machine, &run.elements) {
-        if let Transition::Blend(blend) = transition {
-            low -= 2.0 * blend.t_mm * (1.0 - (blend.angle_rad / 2.0).cos());
+        match transition {
+            Transition::Blend(blend) => low -= 2.0 * blend.t_mm * (1.0 - (blend.angle_rad / 2.0).cos()),
+            // It takes half of each block at most, of 0.3 mm of tolerance no more than a few millimetres.
+            Transition::Smooth => low -= 5.0,
+            Transition::Stop | Transition::Pass => {}
         }
     }
     let length = run.summary.path_length_mm;

@@ -57,7 +57,7 @@ impl<'a> Judge<'a> {
         for (number, (transition, after)) in self.transitions.range(a.block..b.block) {
             match transition {
                 Transition::Blend(_) => blend_ends += if *number == a.block { 1 } else { 2 },
-                Transition::Stop => {}
+                Transition::Stop | Transition::Smooth => {}
                 Transition::Pass => self.pass(&self.run.elements[number], after, a.feed.max(b.feed), &mut steps),
             }
         }
@@ -152,6 +152,21 @@ fn random_programs() {
             for seed in offset..offset + 8 {
                 judge(&machine, &format!("{name} seed {seed}"), &program(seed, kind, 60, &[]));
             }
+        }
+    }
+}
+
+/// G643, G644 and G645, RND and the compressor.
+#[test]
+fn random_programs_of_every_path_mode() {
+    for (n, name) in MACHINES.into_iter().enumerate() {
+        let machine = machine(name, &[]);
+        for seed in 900..904 {
+            let seed = seed + 10 * n as u64;
+            judge(&machine, &format!("{name} seed {seed}"), &program(seed, Kind::Smoothed, 60, &[]));
+        }
+        for mode in ["G643 CTOL=0.02", "G644", "G645 CTOL=0.02", "G642 COMPON CTOL=0.02", "G645 COMPCAD CTOL=0.02"] {
+            judge(&machine, &format!("{name} {mode}"), &dense(mode, 8000.0, 300));
         }
     }
 }

@@ -12,6 +12,8 @@ pub enum Kind {
     Continuous,
     /// Everything, modes change.
     Mixed,
+    /// Everything in G643, G644, G645.
+    Smoothed,
 }
 
 struct Writer {
@@ -31,6 +33,7 @@ pub fn program(seed: u64, kind: Kind, blocks: usize, rotary: &[&'static str]) ->
         Kind::Rounded => "G642 CTOL=0.08\n",
         Kind::Continuous => "G64\n",
         Kind::Mixed => "G60\n",
+        Kind::Smoothed => "G643 CTOL=0.05\n",
     };
     writer.text += "G1 Z10 F2000\n";
     writer.at = [0.0, 0.0, 10.0];
@@ -62,6 +65,10 @@ impl Writer {
             }
             1 if kind == Kind::Mixed => {
                 let mode = ["G60", "G64", "G641 ADIS=0.4", "G642 CTOL=0.03"][self.random.below(4) as usize];
+                self.say(format_args!("{mode}\n"));
+            }
+            1 if kind == Kind::Smoothed => {
+                let mode = ["G643 CTOL=0.05", "G644", "G645 CTOL=0.03", "G642 CTOL=0.1"][self.random.below(4) as usize];
                 self.say(format_args!("{mode}\n"));
             }
             2 if everything => {

@@ -44,7 +44,7 @@ pub fn programs() -> Vec<OpenedProgram> {
 }
 
 pub fn program(id: u16, name: &str, bytes: &[u8]) -> OpenedProgram {
-    OpenedProgram { id: ProgramId(id), name: Arc::from(name), bytes: Arc::from(bytes) }
+    OpenedProgram { id: ProgramId(id), name: Arc::from(name), bytes: bytes.into() }
 }
 
 /// Value of signal `number` of an axis at a tick: all different, irregular in their bits, one in seven exactly zero.

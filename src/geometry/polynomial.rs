@@ -1,0 +1,185 @@
+//! Polynomials and rational polynomials up to degree 5, by arc length: ASPLINE, BSPLINE, CSPLINE, POLY.
+//!
+//! In: start, end and the [`PolynomialGeometry`] of the move. Out: [`PolynomialCurve`]. Parts share the table of the whole. As with
+//! arcs, what the programmed points miss of the pieces is rounding and is spread linearly.
+//!
+//! With the speed `sigma = |dq/du|` over the axes that count, and primes for d/ds:
+//!
+//! ```text
+//! dq/du   = sigma q'
+//! d²q/du² = sigma² q'' + sigma_u q'
+//! d³q/du³ = sigma³ q''' + 3 sigma sigma_u q'' + sigma_uu q'
+//! ```
+//!
+//! Does not make splines from points: that is the interpreter's.
+
+use super::CurveState;
+use super::arc_length::{ArcLengthTable, Panel};
+use super::rational::derivatives;
+use crate::base::{AxisVector, PartPoint, PerAxis};
+use crate::interpreter::PolynomialGeometry;
+use std::sync::Arc;
+
+/// Directions that differ by less go on smoothly.
+const SAME_DIRECTION_RATIO: f64 = 1e-9;
+
+/// Curvatures that differ by less than this share go on smoothly.
+const SAME_CURVATURE_RATIO: f64 = 1e-6;
+
+/// A chain of polynomial pieces, or a part of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PolynomialCurve {
+    table: Arc<ArcLengthTable>,
+    start: PartPoint,
+    end: PartPoint,
+    /// Panels that the part lies in.
+    panels: [usize; 2],
+    /// Arc length of the whole where this part begins.
+    offset_lu: f64,
+    length_lu: f64,
+    /// Added to the pieces: at the start of the whole, and per arc length.
+    shift: AxisVector,
+    shift_slope: AxisVector,
+}
+
+impl PolynomialCurve {
+    /// From `start` to `end` along `geometry`; `linear` says which axes count as path length. Without displacement the length is 0,
+    /// and it is NaN where there is no such curve (a pole, numbers out of range).
+    pub fn new(start: PartPoint, end: PartPoint, geometry: &Arc<PolynomialGeometry>, linear: &PerAxis<bool>) -> Self {
+        let table = Arc::new(ArcLengthTable::new(geometry.clone(), linear));
+        let length_lu = table.length_lu();
+        let panels = [0, table.panels().len().saturating_sub(1)];
+        let mut curve = Self {
+            table,
+            start,
+            end,
+            panels,
+            offset_lu: 0.0,
+            length_lu,
+            shift: AxisVector::zero(),
+            shift_slope: AxisVector::zero(),
+        };
+        if length_lu > 0.0 {
+            curve.shift = start.0 - curve.state_at(0.0).position.0;
+            let at_end = end.0 - curve.state_at(length_lu).position.0;
+            curve.shift_slope = at_end.map(|missing| missing / length_lu);
+        }
+        curve
+    }
+
+    /// Arc length.
+    pub fn length_lu(&self) -> f64 {
+        self.length_lu
+    }
+
+    /// True where no linear axis moves: lengths are then in rad.
+    pub fn rotary_only(&self) -> bool {
+        self.table.rotary_only()
+    }
+
+    /// First point.
+    pub fn start(&self) -> PartPoint {
+        self.start
+    }
+
+    /// Last point.
+    pub fn end(&self) -> PartPoint {
+        self.end
+    }
+
+    /// The curve at s, clamped to its ends.
+    pub fn at(&self, s_lu: f64) -> CurveState {
+        let s_lu = s_lu.max(0.0).min(self.length_lu);
+        let mut state = self.state_at(s_lu);
+        if s_lu >= self.length_lu {
+            state.position = self.end;
+        } else if s_lu <= 0.0 {
+            state.position = self.start;
+        }
+        state
+    }
+
+    /// Places between which the curve is smooth and changes little, in order, without the ends: where the quadrature had to be cut.
+    pub fn nodes_lu(&self) -> impl Iterator<Item = f64> {
+        let borders = self.own_panels().iter().map(|panel| panel.lengths_lu[0] - self.offset_lu);
+        borders.filter(|s_lu| *s_lu > 0.0 && *s_lu < self.length_lu)
+    }
+
+    /// Places inside where the direction or the curvature steps, in order.
+    pub fn breaks_lu(&self) -> Vec<f64> {
+        let pairs = self.own_panels().windows(2);
+        let breaks = pairs.filter(|pair| self.steps_between(&pair[0], &pair[1]));
+        breaks.map(|pair| pair[1].lengths_lu[0] - self.offset_lu).collect()
+    }
+
+    /// The part from `start_lu` to `end_lu`, both inside the curve and in order.
+    pub(super) fn trimmed(&self, start_lu: f64, end_lu: f64) -> Self {
+        let mut part = self.clone();
+        part.start = self.at(start_lu).position;
+        part.end = self.at(end_lu).position;
+        part.offset_lu = self.offset_lu + start_lu;
+        part.length_lu = end_lu - start_lu;
+        let (from_lu, to_lu) = (part.offset_lu, self.offset_lu + end_lu);
+        let panels = self.own_panels();
+        // A part that begins on a border begins with what follows it, and one that ends there ends with what is before it.
+        let first = panels.partition_point(|panel| panel.lengths_lu[1] <= from_lu);
+        let last = panels.partition_point(|panel| panel.lengths_lu[0] < to_lu).saturating_sub(1);
+        let [low, high] = self.panels;
+        let first = (low + first).min(high);
+        part.panels = [first, (low + last).max(first).min(high)];
+        part
+    }
+
+    fn own_panels(&self) -> &[Panel] {
+        let [first, last] = self.panels;
+        self.table.panels().get(first..=last).unwrap_or(&[])
+    }
+
+    /// The pieces with what is added to them at s of this part.
+    fn state_at(&self, s_lu: f64) -> CurveState {
+        let along_lu = self.offset_lu + s_lu;
+        let panels = self.own_panels();
+        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(panels.len().saturating_sub(1));
+        let Some(panel) = panels.get(index) else {
+            let still = AxisVector::zero();
+            return CurveState { position: self.start, first: still, second: still, third: still };
+        };
+        let u = self.table.parameter_at(panel, along_lu);
+        let mut state = self.pieces_at(panel, u);
+        state.position.0 += self.shift + self.shift_slope * along_lu;
+        state.first += self.shift_slope;
+        state
+    }
+
+    /// A piece at u, derivatives to s.
+    fn pieces_at(&self, panel: &Panel, u: f64) -> CurveState {
+        let (linear, counted) = (self.table.linear(), self.table.counted());
+        let piece = &self.table.pieces()[panel.piece];
+        let exact = derivatives(piece, linear, u);
+        let [low, high] = panel.safe_ratio;
+        let safe = u.max(low).min(high);
+        let d = if safe == u { exact } else { derivatives(piece, linear, safe) };
+        let (q_u, q_uu, q_uuu) = (d.first, d.second, d.third);
+        let [c_u, c_uu] = [q_u, q_uu].map(|vector| vector.masked(counted));
+        let sigma = c_u.norm();
+        let sigma_u = c_u.dot(&q_uu) / sigma;
+        let sigma_uu = (c_uu.dot(&q_uu) + c_u.dot(&q_uuu) - sigma_u * sigma_u) / sigma;
+        let first = q_u * (1.0 / sigma);
+        let second = (q_uu - first * sigma_u) * (1.0 / (sigma * sigma));
+        let third = (q_uuu - second * (3.0 * sigma * sigma_u) - first * sigma_uu) * (1.0 / (sigma * sigma * sigma));
+        CurveState { position: PartPoint(exact.position), first, second, third }
+    }
+
+    /// The direction or the curvature steps from one panel to the next.
+    fn steps_between(&self, before: &Panel, after: &Panel) -> bool {
+        if before.piece == after.piece && before.safe_ratio == after.safe_ratio {
+            return false;
+        }
+        let end = self.pieces_at(before, before.ends_ratio[1]);
+        let start = self.pieces_at(after, after.ends_ratio[0]);
+        let turn = (start.first - end.first).norm();
+        let bend = (start.second - end.second).norm();
+        !(turn <= SAME_DIRECTION_RATIO
+            && bend <= SAME_CURVATURE_RATIO * start.second.norm().max(end.second.norm()).max(SAME_CURVATURE_RATIO))
+    }
+}

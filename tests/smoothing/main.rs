@@ -1,0 +1,7 @@
+//! Tests of the room `smoothing`: corners, inserts, path modes, compressor.
+
+mod compressor;
+mod inserts;
+mod modes;
+mod polylines;
+mod support;
