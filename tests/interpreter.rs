@@ -418,7 +418,7 @@ fn words_not_acted_on_are_reported_once() {
     let result = run(text);
     assert!(result.alarm.is_none(), "{}", result.alarm().render(false));
     let words: Vec<_> = result.warnings.iter().map(|warning| warning.message.split('`').nth(1).unwrap()).collect();
-    assert_eq!(words, ["MCALL", "CYCLE81", "G41", "ACC", "WHEN", "Sn=", "Mn=", "H"]);
+    assert_eq!(words, ["CYCLE81", "G41", "WHEN"]);
     assert!(result.warnings.iter().all(|warning| warning.code == "W0001" && warning.line() > 0));
 }
 
@@ -445,17 +445,7 @@ fn a_tool_without_data_is_reported_once() {
 
 #[test]
 fn words_that_would_change_the_motion_are_errors() {
-    for text in [
-        "TRAORI",
-        "A3=0 B3=0 C3=1",
-        "CIP X1 Y1 I1=2 J1=2",
-        "G95",
-        "TOFRAME",
-        "BSPLINE X1",
-        "G33 Z1 K1",
-        "DEF FRAME FF",
-        "CALL \"A\"",
-    ] {
+    for text in ["TRAORI", "A3=0 B3=0 C3=1", "CIP X1 Y1 I1=2 J1=2", "TOFRAME", "BSPLINE X1", "G33 Z1 K1"] {
         let result = run(text);
         assert_eq!(result.alarm().code, "E0202", "{text}");
         assert!(result.alarm().message.contains("not built"), "{text}: {}", result.alarm().message);

@@ -102,3 +102,24 @@ fn what_makes_no_corner_is_refused() {
         assert_eq!(run(text).alarm().code, code, "{text}");
     }
 }
+
+#[test]
+fn frames_turn_and_scale_what_stands_in_a_corner() {
+    let corner = |frame: &str| {
+        let result = run(&format!("{frame}\nG1 F600 X10 Y0 RND=2\nY10"));
+        assert!(result.alarm.is_none(), "{}", result.alarm().render(false));
+        *result.moves[0].corner.clone().expect("a corner")
+    };
+    let [x, y, z] = [0, 1, 2].map(AxisId::new);
+    let plain = corner("");
+    assert_eq!((plain.plane, plain.directions), ([x, y], None));
+    // In the plane nothing changes, and a quarter turn leads to another plane of the axes.
+    assert_eq!((corner("ROT Z30").plane, corner("ROT Z30").directions), ([x, y], None));
+    assert_eq!((corner("ROT X90").plane, corner("ROT X90").directions), ([z, x], None));
+    let tilted = corner("ROT X30").directions.expect("a tilted plane");
+    let (sin, cos) = 30.0_f64.to_radians().sin_cos();
+    for (axis, [first, second]) in [(x, [1.0, 0.0]), (y, [0.0, cos]), (z, [0.0, sin])] {
+        assert!((tilted[0][axis] - first).abs() < 1e-12 && (tilted[1][axis] - second).abs() < 1e-12, "{tilted:?}");
+    }
+    assert_eq!(corner("SCALE X3 Y3").shape, CornerShape::Fillet { radius_mm: 6.0 });
+}

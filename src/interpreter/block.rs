@@ -103,7 +103,7 @@ impl Interpreter {
         if block.motion.any() {
             self.motion(&block.motion, &mut events)?;
             if let Some(last) = self.queue.pop_back() {
-                let corner = self.corner_insert(&last.kind, &block.corner);
+                let corner = self.corner_insert(&last.kind, &block.corner, block.motion.suppression);
                 self.queue.push_back(Move { corner, ..last });
             }
         }

@@ -48,6 +48,8 @@ impl<'m> Listing<'m> {
     /// The line of the next move, without a line end.
     pub fn line(&mut self, next: &Move) -> String {
         let modes = (self.modes.as_ref() != Some(&next.modes)).then(|| self.modes_text(&next.modes));
+        // Another tool, say, is a change of the modes that no word shows.
+        let modes = modes.filter(|text| !text.is_empty());
         self.modes = Some(next.modes.clone());
         let start = std::mem::replace(&mut self.start, next.end);
         format_with(self.machine, start, next, modes.as_deref())

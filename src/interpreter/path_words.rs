@@ -14,10 +14,10 @@ use super::evaluate::{evaluate, number};
 use super::run::Interpreter;
 use super::wire::{Compressor, CornerInsert, CornerShape, MoveKind, ProgrammedLimits};
 use crate::base::units::rad_from_deg;
-use crate::base::{AxisId, AxisKind};
+use crate::base::{AxisId, AxisKind, AxisVector, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
 use crate::program::syntax::{Address, Expr, ExprKind, IndexedValue, Typed};
-use crate::program::words::Plane;
+use crate::program::words::{Plane, Suppression};
 use crate::program::{Columns, Fault, Outcome, codes};
 use std::sync::Arc;
 
@@ -35,6 +35,9 @@ const MACHINING_TYPES: &[(&str, i32)] = &[
     ("_TOP_SURFACE_SMOOTH_OFF", 1_000_000),
     ("_TOP_SURFACE_SMOOTH_ON", 2_000_000),
 ];
+
+/// Relative difference up to which two lengths are the same.
+const SAME_SCALE_RATIO: f64 = 1e-12;
 
 /// Most parameters of CYCLE832.
 const CYCLE832_PARAMETERS: usize = 4;
@@ -182,10 +185,17 @@ impl Interpreter {
     }
 
     /// What stands in the corner at the end of a move of this kind.
-    pub(super) fn corner_insert(&self, kind: &MoveKind, words: &CornerWords) -> Option<Box<CornerInsert>> {
+    pub(super) fn corner_insert(
+        &self,
+        kind: &MoveKind,
+        words: &CornerWords,
+        suppression: Option<Suppression>,
+    ) -> Option<Box<CornerInsert>> {
         let fillet = |radius_mm| CornerShape::Fillet { radius_mm };
         let shape = words.shape.unwrap_or(self.modal.corner.radius_mm.map(fillet))?;
-        let moves = matches!(kind, MoveKind::Rapid | MoveKind::Line | MoveKind::Arc(_) | MoveKind::SpatialArc(_));
+        if !matches!(kind, MoveKind::Rapid | MoveKind::Line | MoveKind::Arc(_) | MoveKind::SpatialArc(_)) {
+            return None;
+        }
         let indices = match self.modal.plane {
             Plane::G17 => [0, 1],
             Plane::G18 => [2, 0],
@@ -193,8 +203,32 @@ impl Interpreter {
         };
         let linear = |id: &AxisId| self.machine.axis(*id).kind == AxisKind::Linear;
         let [Some(first), Some(second)] = indices.map(|index| self.geometry[index].filter(linear)) else { return None };
+        let frame = &self.frames_of(suppression).frame;
+        let along = |axis: AxisId| PerAxis::from_fn(|other| f64::from(u8::from(other == axis)));
+        let turned = [first, second].map(|axis| frame.direction_outward(&along(axis)));
+        let scales = turned.map(|direction| direction.norm());
+        // Of unequal scales there is no circle; the program's length stands then.
+        let scale_ratio = if (scales[0] - scales[1]).abs() < SAME_SCALE_RATIO { scales[0] } else { 1.0 };
+        let (plane, tilted) = match self.plane_of_directions(&turned) {
+            Some(plane) => (plane, false),
+            None => ([first, second], true),
+        };
+        let unit = |k: usize| turned[k] * (1.0 / scales[k]);
+        let directions = tilted.then(|| [unit(0), unit(1)]);
         let feed_mm_s = words.feed_mm_s.unwrap_or(self.modal.corner.feed_mm_s);
-        moves.then(|| Box::new(CornerInsert { shape, plane: [first, second], directions: None, feed_mm_s }))
+        Some(Box::new(CornerInsert { shape: scaled(shape, scale_ratio), plane, directions, feed_mm_s }))
+    }
+
+    /// The two geometry axes in whose plane both directions lie, in the order of G17, G18 and G19.
+    fn plane_of_directions(&self, directions: &[AxisVector; 2]) -> Option<[AxisId; 2]> {
+        [[0, 1], [2, 0], [1, 2]].into_iter().find_map(|[a, b]| {
+            let [first, second] = [self.geometry[a]?, self.geometry[b]?];
+            let inside = |direction: &AxisVector| {
+                let flat = direction[first].hypot(direction[second]);
+                (direction.norm() - flat).abs() < SAME_SCALE_RATIO * flat
+            };
+            directions.iter().all(inside).then_some([first, second])
+        })
     }
 
     /// A length that may be 0.
@@ -267,5 +301,14 @@ impl Interpreter {
             kind => kind.clone(),
         };
         Expr { kind, ..expr.clone() }
+    }
+}
+
+/// The shape as a frame scales it.
+fn scaled(shape: CornerShape, ratio: f64) -> CornerShape {
+    match shape {
+        CornerShape::Fillet { radius_mm } => CornerShape::Fillet { radius_mm: radius_mm * ratio },
+        CornerShape::ChamferBase { length_mm } => CornerShape::ChamferBase { length_mm: length_mm * ratio },
+        CornerShape::ChamferLeg { length_mm } => CornerShape::ChamferLeg { length_mm: length_mm * ratio },
     }
 }

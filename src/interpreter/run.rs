@@ -337,7 +337,7 @@ impl Interpreter {
         let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
         let modes = self.modal.modes(exact_stop);
         let corner = match self.modal.corner.radius_mm {
-            Some(_) => self.corner_insert(&kind, &CornerWords::default()),
+            Some(_) => self.corner_insert(&kind, &CornerWords::default(), None),
             None => None,
         };
         self.queue.push_back(Move { block, kind, end: self.position, feed, modes, corner, events });

@@ -68,10 +68,7 @@ impl Tolerances {
         let together = taken(deviation.masked(linear).norm(), self.contour_mm);
         let each = deviation.as_slice().iter().zip(self.axis_lu.as_slice());
         let alone = each.map(|(deviation, tolerance)| taken(*deviation, *tolerance));
-        let greater = |most: f64, share: f64| match share.is_nan() {
-            true => f64::INFINITY,
-            false => most.max(share),
-        };
+        let greater = |most: f64, share: f64| if share.is_nan() { f64::INFINITY } else { most.max(share) };
         alone.fold(greater(0.0, together), greater)
     }
 }
