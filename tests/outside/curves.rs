@@ -27,11 +27,11 @@ fn within_limits(machine: &Machine, rows: &[(u32, Vec<f64>)], text: &str) {
     for (i, axis) in machine.axes.iter().enumerate() {
         let limits = &axis.limits;
         let q = |k: usize| rows[k].1[i];
-        for k in 1..rows.len() - 2 {
+        for (k, (line, _)) in rows.iter().enumerate().take(rows.len() - 2).skip(1) {
             let v = (q(k + 1) - q(k)) / t_s;
             let a = (q(k + 1) - 2.0 * q(k) + q(k - 1)) / t_s.powi(2);
             let j = (q(k + 2) - 3.0 * q(k + 1) + 3.0 * q(k) - q(k - 1)) / t_s.powi(3);
-            let at = format!("{} in line {}, {} s\n{text}", axis.name, rows[k].0, k as f64 * t_s);
+            let at = format!("{} in line {}, {} s\n{text}", axis.name, line, k as f64 * t_s);
             assert!(v.abs() <= limits.velocity_max_lu_s * (1.0 + 1e-9), "velocity {v} of {at}");
             assert!(a.abs() <= limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "acceleration {a} of {at}");
             // Rounding of positions and of the arc length: 1e-12 mm.
