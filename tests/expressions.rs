@@ -201,7 +201,7 @@ fn a_char_is_a_number_and_a_character() {
 
 #[test]
 fn the_character_0_ends_a_text() {
-    // The example of the programming manual (string operations).
+    // The example of the programming manual (string operations); the place is that of the German text there.
     let text = "DEF STRING[20] STRG=\"axis . stationary\"\nSTRG[5]=\"X\"\nMSG(STRG)\nSTRG[5]=0\nMSG(STRG)\nMSG(\"\"<<STRLEN(STRG))\n";
     assert_eq!(run(text).0, ["axis X stationary", "axis ", "5"]);
 }
@@ -251,16 +251,21 @@ fn names_have_at_most_31_characters() {
 fn arrays_are_filled_from_an_element_on() {
     let shown = |start: &str| {
         run(&format!(
-            "DEF INT A[2,2,2]\n{start}\nMSG(\"\"<<A[0,0,0]<<A[0,0,1]<<A[0,1,0]<<A[0,1,1]<<A[1,0,0]<<A[1,0,1]<<A[1,1,0]<<A[1,1,1])\n"
+            "DEF INT ARR[2,2,2]\n{start}\nMSG(\"\"<<ARR[0,0,0]<<ARR[0,0,1]<<ARR[0,1,0]<<ARR[0,1,1]<<ARR[1,0,0]<<ARR[1,0,1]<<ARR[1,1,0]<<ARR[1,1,1])\n"
         ))
         .0
     };
-    assert_eq!(shown("A[0,0,0]=SET(1,2,3,4,5,6,7,8)"), ["12345678"]);
+    assert_eq!(shown("ARR[0,0,0]=SET(1,2,3,4,5,6,7,8)"), ["12345678"]);
     // The last index runs fastest; a gap leaves its element alone.
-    assert_eq!(shown("A[0,1,0]=SET(1,,3)"), ["00103000"]);
-    assert_eq!(shown("A[0,1,1]=REP(7)"), ["00077777"]);
-    assert_eq!(shown("A[0,1,1]=REP(7,2)"), ["00077000"]);
-    assert_eq!(run("DEF INT A[2]=SET(1,2,3)\n").1, Some("E0307"));
+    assert_eq!(shown("ARR[0,1,0]=SET(1,,3)"), ["00103000"]);
+    assert_eq!(shown("ARR[0,1,1]=REP(7)"), ["00077777"]);
+    assert_eq!(shown("ARR[0,1,1]=REP(7,2)"), ["00077000"]);
+    // In a DEF, SET may be left out.
+    assert_eq!(
+        run("DEF INT ARR[2,2]=(1,2,,4), SUM[2]=(3+4)*2\nMSG(\"\"<<ARR[0,1]<<ARR[1,1]<<ARR[1,0]<<SUM[1])\n").0,
+        ["24014"]
+    );
+    assert_eq!(run("DEF INT ARR[2]=SET(1,2,3)\n").1, Some("E0307"));
     assert_eq!(run("DEF REAL FAR[400,400,400]\n").1, Some("E0309"));
     assert_eq!(run("DEF REAL FAR[2,2,2,2]\n").1, Some("E0307"));
 }
@@ -314,4 +319,41 @@ fn a_datum_that_is_not_in_the_machine_file_is_named() {
     }
     assert_eq!(run("MSG($MC_AXCONF_GEOAX_NAME_TAB[1]<<$MC_MM_NUM_R_PARAM)\n").0, ["Y32535"]);
     assert_eq!(run("MSG(\"\"<<$P_OTOL)\nOTOL=0.5\nMSG(\"\"<<$P_OTOL)\n").0, ["-1", "0.5"]);
+}
+
+#[test]
+fn the_feed_is_told_in_its_unit() {
+    for (text, shown) in [
+        ("F500\n", "500"),
+        ("G95 F0.2 S1000 M3\n", "0.2"),
+        ("G93 F2\n", "2"),
+        ("G931 F3\n", "3"),
+        ("G700 F20\n", "20"),
+        ("G1 X1 F250\n", "250"),
+    ] {
+        assert_eq!(run(&format!("{text}MSG(\"\"<<$P_F)\n")).0, [shown], "{text}");
+    }
+}
+
+#[test]
+fn g_functions_are_told_by_their_number() {
+    // Programming manual, list of G functions: place of each in its group.
+    for (text, group, number) in [
+        ("G0 X0", 1, 1),
+        ("G18", 6, 2),
+        ("G64", 10, 2),
+        ("G602", 12, 2),
+        ("G70", 13, 1),
+        ("G91", 14, 2),
+        ("G95", 15, 3),
+        ("SOFT", 21, 2),
+        ("FFWOF", 24, 1),
+        ("COMPCAD", 30, 4),
+        ("FLIN", 37, 2),
+        ("RTLIOF", 55, 2),
+        ("DYNFINISH", 59, 5),
+    ] {
+        assert_eq!(run(&format!("{text}\nMSG(\"\"<<$P_GG[{group}])\n")).0, [number.to_string()], "{text}");
+    }
+    assert_eq!(run("R1=$P_GG[99]\n").1, Some("E0307"));
 }

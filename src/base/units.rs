@@ -88,6 +88,11 @@ pub fn mm_from_um(length_um: f64) -> f64 {
     length_um / UM_PER_MM
 }
 
+/// mm -> inch.
+pub fn inch_from_mm(length_mm: f64) -> f64 {
+    length_mm / MM_PER_INCH
+}
+
 /// inch -> mm.
 pub fn mm_from_inch(length_inch: f64) -> f64 {
     length_inch * MM_PER_INCH

@@ -5,7 +5,7 @@
 use super::failure::Failure;
 use super::inputs::{MachineChoice, Surroundings};
 use super::output::{show, written};
-use crate::base::{AxisKind, Diagnostic, PartPoint, Severity, units};
+use crate::base::{AxisKind, AxisVector, Diagnostic, PartPoint, Severity, units};
 use crate::interpreter::{Interpreter, Listing, Move, MoveKind, Setup, feed_per_minute, kind_name};
 use crate::machine::Machine;
 use clap::Args;
@@ -104,12 +104,40 @@ fn json_of(next: &Move, start: PartPoint, machine: &Machine) -> Value {
             fields.insert("radius_mm".into(), json!(arc.radius_mm));
             fields.insert("sweep_deg".into(), json!(units::deg_from_rad(arc.sweep_rad)));
         }
+        MoveKind::SpatialArc(arc) => {
+            let named = |vector: &AxisVector| by_name(machine, vector, false);
+            fields.insert("directions".into(), json!(arc.directions.each_ref().map(named)));
+            fields.insert("centre_mm".into(), named(&arc.centre_mm));
+            fields.insert("radius_mm".into(), json!(arc.radius_mm));
+            fields.insert("sweep_deg".into(), json!(units::deg_from_rad(arc.sweep_rad)));
+        }
+        MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => {
+            let pieces = geometry.pieces.iter().map(|piece| {
+                let rows: Vec<Value> = piece.numerator_lu.iter().map(|row| by_name(machine, row, true)).collect();
+                json!({
+                    "parameter_end": piece.parameter_end_ratio,
+                    "numerator": rows,
+                    "denominator": piece.denominator_ratio,
+                })
+            });
+            fields.insert("pieces".into(), pieces.collect());
+        }
         MoveKind::Dwell { time_s } => {
             fields.insert("time_s".into(), json!(time_s));
         }
         _ => {}
     }
     Value::Object(fields)
+}
+
+/// Components by axis, rotary ones in degrees.
+fn by_name(machine: &Machine, vector: &AxisVector, with_rotary: bool) -> Value {
+    let axes = machine.axis_ids().map(|id| (machine.axis(id), vector[id]));
+    let shown = axes.filter(|(axis, _)| with_rotary || axis.kind == AxisKind::Linear).map(|(axis, value_lu)| {
+        let rotary = axis.kind == AxisKind::Rotary;
+        (axis.name.clone(), json!(if rotary { units::deg_from_rad(value_lu) } else { value_lu }))
+    });
+    Value::Object(shown.collect())
 }
 
 /// Where the axes stand before the first move.

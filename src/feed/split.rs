@@ -153,8 +153,8 @@ fn tightest(stretches: &[Stretch], scan: &Scan, way_lu: &impl Fn(&Stretch, &Stre
         let slower = neighbours.filter(|other| other.speed_lu_s < stretch.speed_lu_s);
         let needed_lu: f64 = slower.map(|other| way_lu(other, stretch)).sum();
         let room = length_lu(stretch, scan) / needed_lu;
-        // Without a slower neighbour the room is infinite.
-        if room < least.0 {
+        // A stretch without a slower neighbour needs no room.
+        if needed_lu > 0.0 && room < least.0 {
             least = (room, Some(i));
         }
     }

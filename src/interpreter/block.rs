@@ -14,7 +14,7 @@ use super::value::Value;
 use super::wire::{Event, Move, MoveKind};
 use crate::base::units::S_PER_MIN;
 use crate::program::syntax::{Address, AddressValue, Expr, Form, IndexedValue, Target, Typed, Word, WordKind};
-use crate::program::words::{GFunction, IndexedAddress, Keyword, Procedure, Suppression};
+use crate::program::words::{GFunction, IndexedAddress, Keyword, PoleOrigin, Procedure, Suppression};
 use crate::program::{Columns, Fault, Outcome, codes, whole_number};
 use std::sync::Arc;
 
@@ -45,6 +45,8 @@ pub(super) struct Collected {
     pub positions: PositionWords,
     pub frame: FrameRequest,
     dwell: Option<Columns>,
+    /// G110, G111, G112.
+    pub pole: Option<(PoleOrigin, Columns)>,
     /// RND, CHF, CHR, FRC.
     pub corner: CornerWords,
     /// Output with the motion.
@@ -76,6 +78,7 @@ impl Interpreter {
             // Before S: with G25 and G26 it is a limit.
             self.frame_request(&mut block)?;
             self.take_feed(&mut block)?;
+            self.pole_request(&mut block)?;
             self.act(&mut block)?;
         }
         if block.stops {

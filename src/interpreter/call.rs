@@ -273,8 +273,8 @@ impl Interpreter {
 
     fn default_of(&mut self, parameter: &Parameter, line: u32, columns: &Columns) -> Outcome<Whole> {
         let value = match &parameter.default {
-            Some(value) => Some(evaluate(value, self)?),
-            None => None,
+            Some(value) => evaluate(value, self)?,
+            None => self.variables.initial(parameter.variable_type),
         };
         let mut sizes = Vec::new();
         for size in &parameter.dimensions {
@@ -283,7 +283,6 @@ impl Interpreter {
                 None => 1,
             });
         }
-        let value = value.unwrap_or_else(|| self.variables.zero(parameter.variable_type));
         Whole::filled(parameter.variable_type, &sizes, &value, line, columns)
     }
 

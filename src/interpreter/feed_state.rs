@@ -33,6 +33,8 @@ pub struct FeedModes {
     pub feed_type: FeedType,
     /// Unit of F.
     pub base: FeedBase,
+    /// G93, G931: time of a block by the last F.
+    pub last_time_s: Option<f64>,
     /// FNORM, FLIN, FCUB.
     pub shape: FeedShape,
     /// F with which the last motion ended: where FLIN and FCUB begin.
@@ -70,6 +72,7 @@ impl Default for FeedModes {
         Self {
             feed_type: FeedType::PerMinute,
             base: FeedBase::Minute,
+            last_time_s: None,
             shape: FeedShape::Constant,
             before: None,
             cutting_speed_mm_s: None,

@@ -84,6 +84,7 @@ impl Interpreter {
             positive_feed(typed, &columns)?;
             if timed {
                 block.motion.block_time_s = Some(time_s(typed));
+                self.modal.feed_modes.last_time_s = block.motion.block_time_s;
             } else {
                 self.modal.feed = Some(self.modal.programmed_feed(typed));
             }

@@ -5,7 +5,7 @@
 use super::modal::Motion;
 use super::run::Interpreter;
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
-use crate::program::words::{Compressor, ExactStop, FeedShape, FeedType, Measure, Plane};
+use crate::program::words::{Compressor, CurveWord, ExactStop, FeedShape, FeedType, Measure, Plane};
 use crate::program::{Columns, Fault, Outcome, codes};
 
 /// Number of G groups.
@@ -21,6 +21,12 @@ impl Interpreter {
                 Motion::Line => 2,
                 Motion::Clockwise => 3,
                 Motion::CounterClockwise => 4,
+                Motion::Curve(CurveWord::ThreePoints) => 5,
+                Motion::Curve(CurveWord::Akima) => 6,
+                Motion::Curve(CurveWord::BSpline) => 7,
+                Motion::Curve(CurveWord::Cubic) => 8,
+                Motion::Curve(CurveWord::Polynomial) => 9,
+                Motion::Curve(CurveWord::Tangential) => 15,
             },
             6 => match modal.plane {
                 Plane::G17 => 1,

@@ -13,17 +13,22 @@
 //! line of the program
 //! ```
 //!
+//! An arc in another plane has its directions and centre in X, Y, Z in place of the plane. A spline or polynomial has the last value of
+//! its parameter and the coefficients of u^0, u^1, ... of the axes that move, `D` for the denominator, its pieces after `|`:
+//! `p2.5 X(0,1,0.2) Y(0,0,1)`.
+//!
 //! A corner that RND, RNDM, CHF or CHR fills adds `RND=5`, `CHF=2` or `CHR=2` before the modes, with FRC or FRCM as `FRC300`.
 //! A dwell adds `4s`, a function that brings the path to rest adds `stops`. Numbers have at most six decimals and no trailing
 //! zeros. Does not read them back.
 
+use super::listing_curves::curve_text;
 use super::motion::rotary_alone;
 use super::value::trimmed;
 use super::wire::{
     Compressor, CornerInsert, CornerShape, Event, ExactStop, Feed, Modes, Move, MoveKind, ProgrammedLimits,
 };
 use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
-use crate::base::{AxisId, AxisKind, PartPoint};
+use crate::base::{AxisKind, PartPoint};
 use crate::machine::{AccelerationMode, Axis, DynamicsMode, Machine, PathMode};
 use std::fmt::Write;
 
@@ -174,7 +179,9 @@ pub fn feed_per_minute(machine: &Machine, start: PartPoint, shown: &Move) -> Opt
         Feed::Varying { feeds_lu_s } => feeds_lu_s.last().copied()?,
     };
     match &shown.kind {
-        MoveKind::Line if rotary_alone(machine, start, shown.end) => Some(deg_from_rad(feed_lu_s) * S_PER_MIN),
+        MoveKind::Line | MoveKind::Spline(_) | MoveKind::Polynomial(_) if rotary_alone(machine, start, shown.end) => {
+            Some(deg_from_rad(feed_lu_s) * S_PER_MIN)
+        }
         MoveKind::Line | MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_) => {
             Some(mm_min_from_mm_s(feed_lu_s))
         }
@@ -204,12 +211,8 @@ fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<
         MoveKind::StopPreparation => add(&mut text, "stops"),
         MoveKind::Function { stops: false } | MoveKind::Position(_) | MoveKind::WaitPositioned(_) => {}
     }
-    if let MoveKind::Arc(arc) = &shown.kind {
-        let name = |id: AxisId| machine.axis(id).name.as_str();
-        let [first, second] = arc.plane;
-        let [a, b] = arc.centre_mm.map(trimmed);
-        let (radius, sweep) = (trimmed(arc.radius_mm), trimmed(deg_from_rad(arc.sweep_rad)));
-        add(&mut text, &format!("{}{} C{a},{b} R{radius} sweep={sweep}", name(first), name(second)));
+    if let Some(curve) = curve_text(machine, &shown.kind) {
+        add(&mut text, &curve);
     }
     if let Some(corner) = &shown.corner {
         add(&mut text, &corner_text(corner));

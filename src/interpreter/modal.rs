@@ -11,7 +11,7 @@ use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
 use crate::machine::{AccelerationMode, DynamicsMode, FeedSettings, PathMode};
 use crate::program::syntax::Typed;
-use crate::program::words::{Measure, Plane};
+use crate::program::words::{CurveWord, Measure, Plane};
 use std::sync::Arc;
 
 /// G group 1.
@@ -25,6 +25,8 @@ pub enum Motion {
     Clockwise,
     /// G3.
     CounterClockwise,
+    /// CIP, CT, splines, POLY.
+    Curve(CurveWord),
 }
 
 /// F word, ready for both kinds of motion.

@@ -5,10 +5,12 @@
 
 use super::arc::{ArcShape, ProgrammedArc, arc_geometry};
 use super::block::FEED_MIN;
+use super::curve_state::CurveWords;
 use super::modal::{Motion, ProgrammedFeed};
 use super::path_feed::Way;
 use super::placement::turn_outward;
 use super::run::Interpreter;
+use super::spline_blocks::{LastMotion, PointWords};
 use super::value::trimmed;
 use super::wire::{Event, MoveKind};
 use crate::base::units::deg_from_rad;
@@ -16,7 +18,7 @@ use crate::base::{AxisId, AxisKind, AxisVector, PartPoint, PerAxis};
 use crate::machine::Machine;
 use crate::program::plain::PlainBlock;
 use crate::program::syntax::{Form, Typed};
-use crate::program::words::{Plane, Suppression};
+use crate::program::words::{CurveWord, Plane, Suppression};
 use crate::program::{Columns, Fault, NotActedOn, Outcome, codes};
 use std::f64::consts::{PI, TAU};
 
@@ -48,6 +50,8 @@ pub(super) struct MotionWords {
     pub radius: Option<(Typed, Columns)>,
     /// TURN.
     pub turns: u32,
+    /// AR, AP, RP, I1, J1, K1, PW, PL, PO.
+    pub curve: Option<Box<CurveWords>>,
     /// G9.
     pub exact_stop: bool,
     /// FB.
@@ -65,6 +69,7 @@ impl Default for MotionWords {
             centre: [None, None, None],
             radius: None,
             turns: 0,
+            curve: None,
             exact_stop: false,
             suppression: None,
             block_feed: None,
@@ -76,7 +81,9 @@ impl Default for MotionWords {
 impl MotionWords {
     /// True if the block moves.
     pub fn any(&self) -> bool {
-        self.axes.as_slice().iter().any(Option::is_some) || self.has_circle_words()
+        self.axes.as_slice().iter().any(Option::is_some)
+            || self.has_circle_words()
+            || self.curve.as_ref().is_some_and(|curve| curve.moves())
     }
 
     /// SUPA, G53, G153: the one that suppresses most holds.
@@ -109,6 +116,8 @@ pub(super) struct PlainWork {
 impl Interpreter {
     /// Moves; takes `events` along if it does.
     pub(super) fn motion(&mut self, words: &MotionWords, events: &mut Vec<Event>) -> Outcome<()> {
+        let resolved = self.resolved(words)?;
+        let words = resolved.as_ref().unwrap_or(words);
         let start = self.position;
         let end = self.end_point(words)?;
         let circle = matches!(self.modal.motion, Motion::Clockwise | Motion::CounterClockwise);
@@ -122,6 +131,11 @@ impl Interpreter {
             Motion::Rapid => MoveKind::Rapid,
             Motion::Line => MoveKind::Line,
             Motion::Clockwise | Motion::CounterClockwise => self.arc(words)?,
+            Motion::Curve(CurveWord::ThreePoints) => self.three_points(words)?,
+            Motion::Curve(CurveWord::Tangential) => self.tangential(words)?,
+            Motion::Curve(CurveWord::Polynomial) => self.polynomial_block(words)?,
+            // The curve is known later.
+            Motion::Curve(_) => MoveKind::Line,
         };
         self.check_work_area(words, &kind, &end)?;
         self.check_travel(words, end);
@@ -133,7 +147,17 @@ impl Interpreter {
             return Ok(());
         }
         let feed = self.feed_of(Way { start, end, kind: &kind }, words)?;
-        self.emit(kind, feed, words.exact_stop, std::mem::take(events));
+        let events = std::mem::take(events);
+        if let Motion::Curve(word @ (CurveWord::Akima | CurveWord::BSpline | CurveWord::Cubic)) = self.modal.motion {
+            let point = PointWords::new(words.curve.as_deref());
+            return self.spline_block(word, start, point, feed, words.exact_stop, events);
+        }
+        let straight = matches!(kind, MoveKind::Rapid | MoveKind::Line);
+        let last = LastMotion { start, kind: (!straight).then(|| kind.clone()) };
+        self.emit(kind, feed, words.exact_stop, events);
+        if !straight || start != end {
+            self.last_motion = last;
+        }
         Ok(())
     }
 
@@ -164,6 +188,9 @@ impl Interpreter {
             let kind = if motion == Motion::Rapid { MoveKind::Rapid } else { MoveKind::Line };
             let feed = self.plain_feed(start, end);
             self.emit(kind, feed, false, Vec::new());
+            if start != end {
+                self.last_motion = LastMotion { start, kind: None };
+            }
         }
         true
     }
@@ -262,13 +289,13 @@ impl Interpreter {
     }
 
     /// I, J, K count from the start of the arc, whatever G90 says; AC() makes them positions.
-    fn centre_mm(&self, word: &AxisWord, start_mm: f64) -> f64 {
+    pub(super) fn centre_mm(&self, word: &AxisWord, start_mm: f64) -> f64 {
         let typed_mm = self.modal.position_lu(AxisKind::Linear, word.typed);
         if word.form == Form::Absolute { typed_mm } else { start_mm + typed_mm }
     }
 
     /// The axes of the working plane: their places among X, Y, Z, and the axes.
-    fn plane(&self, columns: &Columns) -> Outcome<([usize; 2], [AxisId; 2])> {
+    pub(super) fn plane(&self, columns: &Columns) -> Outcome<([usize; 2], [AxisId; 2])> {
         let (indices, name) = match self.modal.plane {
             Plane::G17 => ([0, 1], "G17 (X, Y)"),
             Plane::G18 => ([2, 0], "G18 (Z, X)"),

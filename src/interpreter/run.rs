@@ -5,12 +5,14 @@
 
 use super::active_frames::ActiveFrames;
 use super::call::{Head, ModalCall, Waiting};
+use super::curve_state::CurveState;
 use super::flow::Repeat;
 use super::frame::GeometryAxes;
 use super::modal::Modal;
 use super::path_words::CornerWords;
 use super::placement::KnownPlace;
 use super::setup::{Setup, geometry_axes};
+use super::spline_blocks::{LastMotion, OpenSpline};
 use super::system_values::ChannelMemory;
 use super::tool_words::ToolState;
 use super::variables::Variables;
@@ -69,6 +71,16 @@ pub struct Interpreter {
     pub(super) programmed_lu: AxisVector,
     /// `position` in the workpiece system.
     pub(super) known_place: KnownPlace,
+    /// Modal state of curves.
+    pub(super) curves: CurveState,
+    /// The spline whose blocks wait in the queue.
+    pub(super) open_spline: Option<OpenSpline>,
+    /// A spline that could not be made, to be raised before the next block.
+    pub(super) spline_fault: Option<Box<Fault>>,
+    /// The last move with a way.
+    pub(super) last_motion: LastMotion,
+    /// Moves taken from the queue.
+    pub(super) handed_over_count: u64,
     pub(super) variables: Variables,
     /// Markers, parameters and clocks of the channel.
     pub(super) memory: ChannelMemory,
@@ -157,6 +169,11 @@ impl Interpreter {
             position,
             programmed_lu: known_place.work_lu(),
             known_place,
+            curves: CurveState::default(),
+            open_spline: None,
+            spline_fault: None,
+            last_motion: LastMotion { start: position, kind: None },
+            handed_over_count: 0,
             variables: Variables::new(geometry),
             memory: ChannelMemory::default(),
             main_run: MainRun::default(),
@@ -190,7 +207,7 @@ impl Interpreter {
     /// moves before it; after an alarm there is nothing more.
     pub fn next_move(&mut self) -> Result<Option<Move>, Box<Diagnostic>> {
         loop {
-            if let Some(next) = self.queue.pop_front() {
+            if let Some(next) = self.take_ready() {
                 let takes_time = match next.kind {
                     MoveKind::Function { .. } | MoveKind::WaitPositioned(_) | MoveKind::StopPreparation => false,
                     MoveKind::Dwell { time_s } => time_s > 0.0,
@@ -202,6 +219,13 @@ impl Interpreter {
                 }
                 self.handed_over = next.end;
                 return Ok(Some(next));
+            }
+            if !matches!(self.state, State::Running) && self.open_spline.is_some() {
+                self.close_spline(None);
+                continue;
+            }
+            if let Some(fault) = self.spline_fault.take() {
+                self.state = State::Alarm(Box::new(self.diagnostic(*fault)));
             }
             match std::mem::replace(&mut self.state, State::Ended) {
                 State::Running => {}
@@ -329,8 +353,24 @@ impl Interpreter {
         self.state = State::Ended;
     }
 
+    /// The next move, unless it waits for its spline.
+    fn take_ready(&mut self) -> Option<Move> {
+        if self.open_spline.as_ref().is_some_and(|open| open.holds(self.handed_over_count)) {
+            return None;
+        }
+        let next = self.queue.pop_front()?;
+        self.handed_over_count += 1;
+        Some(next)
+    }
+
     /// Hands a move over.
-    pub(super) fn emit(&mut self, kind: MoveKind, feed: Feed, exact_stop: bool, mut events: Vec<Event>) {
+    pub(super) fn emit(&mut self, kind: MoveKind, feed: Feed, exact_stop: bool, events: Vec<Event>) {
+        self.leave_spline(&kind);
+        self.emit_in_spline(kind, feed, exact_stop, events);
+    }
+
+    /// Hands a move over that does not end a spline.
+    pub(super) fn emit_in_spline(&mut self, kind: MoveKind, feed: Feed, exact_stop: bool, mut events: Vec<Event>) {
         if !self.opened.is_empty() {
             events.splice(0..0, self.opened.drain(..));
         }

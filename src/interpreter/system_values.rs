@@ -8,14 +8,16 @@
 //! there is no main run, and all times are 0.
 
 use super::evaluate::integers;
+use super::feed_state::FeedBase;
 use super::run::Interpreter;
 use super::value::Value;
 use super::wire::Event;
 use crate::base::diagnostics::nearest;
-use crate::base::units::{MM_PER_M, RAD_PER_REV, S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
+use crate::base::units::{MM_PER_M, RAD_PER_REV, S_PER_MIN, deg_from_rad, inch_from_mm, mm_min_from_mm_s};
 use crate::base::{AxisId, AxisKind};
 use crate::machine::DriveData;
 use crate::program::syntax::{Expr, SystemName};
+use crate::program::words::Measure;
 use crate::program::{Columns, Fault, Outcome, SYSTEM_VARIABLES, SystemVariable, codes};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -297,9 +299,17 @@ impl Interpreter {
         .maybe_help(help.or_else(|| Some("docs/system-variables.md lists them".to_owned())))
     }
 
-    /// F as programmed: mm/min, deg/min, mm a revolution.
+    /// F as programmed: mm/min, mm a revolution (inch with G700), 1/min with G93, s with G931.
     fn programmed_f(&self) -> f64 {
-        self.modal.feed.map_or(0.0, |feed| mm_min_from_mm_s(feed.linear_mm_s))
+        let last_time_s = self.modal.feed_modes.last_time_s;
+        match self.modal.feed_modes.base {
+            FeedBase::InverseTime => last_time_s.map_or(0.0, |time_s| S_PER_MIN / time_s),
+            FeedBase::Time => last_time_s.unwrap_or(0.0),
+            FeedBase::Minute | FeedBase::Revolution => {
+                let per_minute = self.modal.feed.map_or(0.0, |feed| mm_min_from_mm_s(feed.linear_mm_s));
+                if self.modal.measure == Measure::Inch { inch_from_mm(per_minute) } else { per_minute }
+            }
+        }
     }
 
     /// $P_PROG[level].

@@ -115,11 +115,6 @@ impl Variables {
         Self { frame_axes, ..Self::default() }
     }
 
-    /// What a variable holds before the first assignment.
-    pub fn zero(&self, variable_type: VariableType) -> Value {
-        zero(variable_type, self.frame_axes)
-    }
-
     /// Number of dimensions of a variable of type FRAME; `None`: it is none.
     pub fn frame_dimensions(&self, name: &str) -> Option<usize> {
         let variable = self.find(name).filter(|variable| variable.variable_type == VariableType::Frame)?;
@@ -218,10 +213,15 @@ impl Variables {
             .label(format!("at most {ELEMENTS_MAX}")));
         }
         self.elements = elements;
-        let zero = self.zero(variable_type);
+        let zero = zero(variable_type, self.frame_axes);
         self.declared
             .insert(name.clone(), Variable { variable_type, line, dimensions: sizes, values: vec![zero; count] });
         Ok(())
+    }
+
+    /// What a variable of that type holds before the first assignment.
+    pub fn initial(&self, variable_type: VariableType) -> Value {
+        zero(variable_type, self.frame_axes)
     }
 
     /// A whole variable, to be handed to a sub-program.

@@ -116,6 +116,7 @@ codes! {
     BAD_FRAME "E0510" "A frame that is not possible";
     WORK_AREA "E0511" "A position outside the work area";
     UNKNOWN_TOOL "E0512" "A tool or an edge that the tool table does not have";
+    BAD_CURVE "E0513" "A curve that these words do not make";
     RAISED "E0601" "An alarm that the program itself raises (SETAL)";
     NOT_ACTED_ON "W0001" "A word that is known but not acted on";
     TRAVEL "W0002" "A position outside the travel of an axis";

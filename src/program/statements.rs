@@ -259,8 +259,23 @@ fn defined_variable(lexer: &mut Lexer) -> Outcome<DefinedVariable> {
         return Err(Fault::new(codes::BAD_INDEX, lexer.columns_from(start), "an array has at most three dimensions")
             .label("too many"));
     }
-    let initial = if lexer.take("=") { initial(lexer)? } else { Initial::None };
+    let initial = match lexer.take("=") {
+        true if dimensions.is_empty() => initial(lexer)?,
+        true => bare_list(lexer).map_or_else(|| initial(lexer), Ok)?,
+        false => Initial::None,
+    };
     Ok(DefinedVariable { name: Arc::from(name.to_ascii_uppercase()), columns, dimensions, initial })
+}
+
+/// `(a, b, c)` behind the equals sign of an array: in a DEF the word SET may be left out. One value in brackets is an expression.
+fn bare_list(lexer: &mut Lexer) -> Option<Initial> {
+    let mut ahead = *lexer;
+    if !ahead.take("(") {
+        return None;
+    }
+    let values = arguments(&mut ahead, ")", false).ok().filter(|values| values.len() > 1)?;
+    *lexer = ahead;
+    Some(Initial::Set(values))
 }
 
 /// A value, SET(...) or REP(...).

@@ -4,11 +4,10 @@
 //! not grow with the length of the program. A file that changes while it is read is an error, because its lines would no longer
 //! be where they were found. Does not know characters or lines.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::SystemTime;
 
 /// Longest file that is held in memory.
 const HELD_BYTES_MAX: u64 = 4 * 1024 * 1024;
@@ -29,7 +28,8 @@ pub enum ProgramText {
 pub struct StreamedFile {
     file: File,
     length: usize,
-    modified: Option<SystemTime>,
+    /// As it was opened.
+    metadata: Metadata,
 }
 
 impl ProgramText {
@@ -47,7 +47,7 @@ impl ProgramText {
             return std::fs::read(path).map(|bytes| Self::Held(bytes.into()));
         }
         let length = usize::try_from(metadata.len()).map_err(|_| io::Error::other("the file is too large"))?;
-        Ok(Self::Streamed(Arc::new(StreamedFile { file, length, modified: metadata.modified().ok() })))
+        Ok(Self::Streamed(Arc::new(StreamedFile { file, length, metadata })))
     }
 
     /// Number of bytes.
@@ -99,7 +99,7 @@ impl ProgramText {
 impl StreamedFile {
     fn read(&self, offset: usize, length: usize) -> io::Result<Vec<u8>> {
         let metadata = self.file.metadata()?;
-        if metadata.len() != self.length as u64 || metadata.modified().ok() != self.modified {
+        if metadata.len() != self.length as u64 || metadata.modified().ok() != self.metadata.modified().ok() {
             return Err(io::Error::other("it was changed while it was being read"));
         }
         let mut bytes = vec![0; length.min(self.length.saturating_sub(offset))];
