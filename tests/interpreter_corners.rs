@@ -52,7 +52,8 @@ fn the_feed_of_a_corner_counts_in_the_unit_of_f() {
     let feed = |text: &str| run(text).moves.last().and_then(|shown| shown.corner.clone()).expect("a corner").feed_mm_s;
     assert_eq!(feed("G95 S600 M3\nG1 F0.1 X10 RND=1 FRC=0.05"), Some(0.5));
     assert_eq!(feed("G93\nG1 F2 X10 RND=1 FRC=0.05"), None);
-    assert_eq!(feed("G700 G1 F10 X1 RND=0.1 FRC=6"), Some(25.4 * 0.1));
+    let inch = feed("G700 G1 F10 X1 RND=0.1 FRC=6").expect("6 inch/min");
+    assert!((inch - 2.54).abs() < 1e-12, "{inch}");
 }
 
 #[test]
