@@ -48,6 +48,15 @@ fn the_feed_of_a_corner_is_that_of_its_block_else_the_modal_one() {
 }
 
 #[test]
+fn the_feed_of_a_corner_counts_in_the_unit_of_f() {
+    let feed = |text: &str| run(text).moves.last().and_then(|shown| shown.corner.clone()).expect("a corner").feed_mm_s;
+    assert_eq!(feed("G95 S600 M3\nG1 F0.1 X10 RND=1 FRC=0.05"), Some(0.5));
+    assert_eq!(feed("G93\nG1 F2 X10 RND=1 FRC=0.05"), None);
+    let inch = feed("G700 G1 F10 X1 RND=0.1 FRC=6").expect("6 inch/min");
+    assert!((inch - 2.54).abs() < 1e-12, "{inch}");
+}
+
+#[test]
 fn tolerances_stay_until_a_negative_value_deletes_them() {
     let text = "G1 F1 OTOL=0.5 ATOL[Z]=0.03 ATOL[B]=0.2 STOLF=4 X1\nOTOL=-1 ATOL[Z]=-1 X2\nSTOLF=-1 ATOL[B]=-1 X3";
     let result = run_bytes(text.as_bytes(), &xyzbc());
@@ -96,6 +105,7 @@ fn what_makes_no_corner_is_refused() {
         ("G1 F1 X1 RND=-1", "E0306"),
         ("G1 F1 X1 FRC=-3", "E0502"),
         ("G1 F1 ATOL[Q]=1 X1", "E0204"),
+        ("G1 F1 ATOL[3]=1 X1", "E0204"),
         ("CYCLE832(0.1,7,1)", "E0306"),
         ("CYCLE832(0.1,_FINE,1)", "E0301"),
     ] {

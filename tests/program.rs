@@ -119,7 +119,7 @@ fn nearest_words_are_offered() {
 
 #[test]
 fn a_check_reports_each_finding_once_in_order() {
-    let text = "G1 X500 F100\nCYCLE832(0.1)\nX499\nY1 G41\nR1=1/R2\nG41";
+    let text = "G1 X500 F100\nCYCLE800(0.1)\nX499\nY1 G41\nR1=1/R2\nG41";
     let found = check(&ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
     let shown: Vec<_> = found.iter().map(|diagnostic| (diagnostic.line(), diagnostic.code)).collect();
     assert_eq!(shown, [(1, "W0002"), (2, "W0001"), (4, "W0001"), (5, "E0304")]);

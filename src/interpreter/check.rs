@@ -41,8 +41,13 @@ pub fn check(setup: impl Into<Setup>, machine: &Machine) -> Vec<Diagnostic> {
         let source = library.source(*unit).clone();
         let typos = every_line(&source, &dialect);
         if typos.is_empty() {
-            found.extend(names_and_partners(&source, &setup, &dialect));
-            found.extend(calls(*unit, &mut library, &dialect));
+            let missing = calls(*unit, &mut library, &dialect);
+            // A typo in ENDIF looks like a call: what it leaves without a partner is its consequence.
+            let misspelt = missing.iter().any(|finding| finding.code == codes::UNKNOWN_WORD);
+            let others = names_and_partners(&source, &setup, &dialect);
+            found.extend(others.into_iter().filter(|finding| !(misspelt && finding.code == codes::UNBALANCED)));
+            found.extend(missing);
+            is_sound &= !misspelt;
         }
         is_sound &= typos.is_empty();
         found.extend(typos);

@@ -1,7 +1,8 @@
 //! Words of corners and tolerances: RND and its kin, OTOL, ATOL, STOLF, CYCLE832.
 //!
 //! In: words of a block. Out: modal state and what stands in the corner. A negative tolerance deletes it: the machine's holds again.
-//! RND=0, CHF=0 and CHR=0 leave out, in their block, what RNDM inserts. FRC and FRCM count in the unit of F, and 0 takes them back.
+//! RND=0, CHF=0 and CHR=0 leave out, in their block, what RNDM inserts. FRC and FRCM count in the unit of F (per
+//! revolution: at the spindle speed when they are read; under G93 they have no effect), and 0 takes them back.
 //!
 //! CYCLE832 does what the cycle of the control does with G functions: SOFT, COMPCAD (COMPSURF where Top Surface is asked for),
 //! G645, UPATH, the dynamics of the machining type, CTOL and, where the tens digit says so, OTOL. Deselected it goes back to
@@ -11,9 +12,10 @@
 
 use super::block::Collected;
 use super::evaluate::{evaluate, number};
+use super::feed_state::FeedBase;
 use super::run::Interpreter;
 use super::wire::{Compressor, CornerInsert, CornerShape, MoveKind, ProgrammedLimits};
-use crate::base::units::rad_from_deg;
+use crate::base::units::{S_PER_MIN, rad_from_deg};
 use crate::base::{AxisId, AxisKind, AxisVector, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
 use crate::program::syntax::{Address, Expr, ExprKind, IndexedValue, Typed};
@@ -253,22 +255,32 @@ impl Interpreter {
             return Err(Fault::new(codes::BAD_FEED, columns.clone(), format!("feed {} is not possible", typed.0))
                 .label("expected 0 or more"));
         }
-        Ok(Some(self.modal.programmed_feed(typed).linear_mm_s))
+        Ok(match self.modal.feed_modes.base {
+            FeedBase::Minute => Some(self.modal.programmed_feed(typed).linear_mm_s),
+            FeedBase::Revolution => Some(self.modal.length_mm(typed) * self.modal.spindle_speed_rpm.abs() / S_PER_MIN)
+                .filter(|feed_mm_s| *feed_mm_s > 0.0),
+            // A time is that of a whole block.
+            FeedBase::InverseTime | FeedBase::Time => None,
+        })
     }
 
-    /// The axis whose name stands in brackets.
+    /// The axis that stands in brackets: a name, or a variable of type AXIS.
     fn tolerance_axis(&self, index: Option<&Expr>, columns: &Columns) -> Outcome<AxisId> {
-        let name = match index.map(|index| &index.kind) {
-            Some(ExprKind::Variable { name, indices }) if indices.is_empty() => name,
-            _ => {
-                return Err(Fault::new(codes::EXPECTED_VALUE, columns.clone(), "ATOL without an axis")
-                    .label("expected ATOL[axis]=value"));
-            }
+        let Some(index) = index else {
+            return Err(Fault::new(codes::EXPECTED_VALUE, columns.clone(), "ATOL without an axis")
+                .label("expected ATOL[axis]=value"));
         };
-        self.machine.axis_by_name(name).ok_or_else(|| {
-            Fault::new(codes::UNKNOWN_AXIS, columns.clone(), format!("the machine has no axis `{name}`"))
-                .label("expected an axis of the machine")
-        })
+        match &index.kind {
+            ExprKind::Variable { name, indices }
+                if indices.is_empty()
+                    && self.machine.axis_by_name(name).is_none()
+                    && !self.variables.is_declared(name) =>
+            {
+                Err(Fault::new(codes::UNKNOWN_AXIS, index.columns.clone(), format!("the machine has no axis `{name}`"))
+                    .label("expected an axis of the machine"))
+            }
+            _ => self.axis_of(index),
+        }
     }
 
     fn set_tolerance(&mut self, set: impl FnOnce(&mut ProgrammedLimits)) {
