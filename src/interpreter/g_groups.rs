@@ -61,11 +61,7 @@ impl Interpreter {
                 }
             }
             15 => self.feed_type_number(),
-            21 => match modal.acceleration_mode {
-                AccelerationMode::Brisk => 1,
-                AccelerationMode::Soft => 2,
-                AccelerationMode::Drive => 3,
-            },
+            21 => acceleration_number(modal.acceleration_mode),
             24 => {
                 if modal.feedforward_active {
                     2
@@ -86,14 +82,7 @@ impl Interpreter {
                 FeedShape::Cubic => 3,
             },
             55 => 1 + i32::from(modal.feed_modes.rapid_by_axis),
-            59 => match modal.dynamics {
-                DynamicsMode::Norm => 1,
-                DynamicsMode::Position => 2,
-                DynamicsMode::Rough => 3,
-                DynamicsMode::SemiFinish => 4,
-                DynamicsMode::Finish => 5,
-                DynamicsMode::Precision => 6,
-            },
+            59 => dynamics_number(modal.dynamics),
             1..=GROUPS => 1,
             _ => {
                 return Err(Fault::new(codes::BAD_INDEX, columns.clone(), format!("there is no G group {group}"))
@@ -123,6 +112,27 @@ impl Interpreter {
 
     /// 0 for G500, 1 for G54 and so on.
     fn zero_offset_number(&self) -> u16 {
-        0
+        self.modal.frames.number()
+    }
+}
+
+/// Member of group 21.
+fn acceleration_number(mode: AccelerationMode) -> i32 {
+    match mode {
+        AccelerationMode::Brisk => 1,
+        AccelerationMode::Soft => 2,
+        AccelerationMode::Drive => 3,
+    }
+}
+
+/// Member of group 59.
+fn dynamics_number(mode: DynamicsMode) -> i32 {
+    match mode {
+        DynamicsMode::Norm => 1,
+        DynamicsMode::Position => 2,
+        DynamicsMode::Rough => 3,
+        DynamicsMode::SemiFinish => 4,
+        DynamicsMode::Finish => 5,
+        DynamicsMode::Precision => 6,
     }
 }
