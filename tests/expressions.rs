@@ -341,6 +341,8 @@ fn g_functions_are_told_by_their_number() {
     for (text, group, number) in [
         ("G0 X0", 1, 1),
         ("G18", 6, 2),
+        ("G55", 8, 3),
+        ("G505", 8, 6),
         ("G64", 10, 2),
         ("G602", 12, 2),
         ("G70", 13, 1),
@@ -356,4 +358,11 @@ fn g_functions_are_told_by_their_number() {
         assert_eq!(run(&format!("{text}\nMSG(\"\"<<$P_GG[{group}])\n")).0, [number.to_string()], "{text}");
     }
     assert_eq!(run("R1=$P_GG[99]\n").1, Some("E0307"));
+}
+
+#[test]
+fn a_sub_program_knows_its_level_and_what_it_was_given() {
+    let text = "%_N_MAIN_MPF\nEXTERN SUB(INT, INT)\nSUB(5)\nMSG(\"\"<<$P_STACK)\nM30\n%_N_SUB_SPF\nPROC SUB(INT AAA, INT BBB)\n\
+        MSG(\"\"<<$P_STACK<<$P_SUBPAR[1]<<$P_SUBPAR[2]<<$P_SUBPAR[0])\nRET\n";
+    assert_eq!(run(text), (vec!["1100".to_owned(), "0".to_owned()], None));
 }

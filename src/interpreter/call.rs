@@ -49,6 +49,8 @@ pub(super) struct Waiting {
     repeats: Vec<Repeat>,
     /// Parameters of the called program that are variables here.
     by_reference: Vec<(Arc<str>, Target, Columns)>,
+    /// Which parameters of the called program the call gave a value, one bit each.
+    values_given: u128,
     /// Modal state at the call, if the called program begins with SAVE.
     saved: Option<Box<Modal>>,
     passes_left: i32,
@@ -71,6 +73,8 @@ pub(super) struct ModalCall {
 /// What a call hands over.
 #[derive(Clone, Debug, Default)]
 struct Given {
+    /// Which parameters have a value in the call, one bit each.
+    values_given: u128,
     parameters: Vec<(Arc<str>, Whole)>,
     by_reference: Vec<(Arc<str>, Target, Columns)>,
     save: bool,
@@ -229,6 +233,21 @@ impl Interpreter {
         Ok(head)
     }
 
+    /// Name of the program at a level in use; 0 is the main program.
+    pub(super) fn program_name_at(&self, level: usize) -> Option<&str> {
+        match self.levels.get(level) {
+            Some(waiting) => Some(waiting.source.file_name()),
+            None if level == self.levels.len() => Some(self.source.file_name()),
+            None => None,
+        }
+    }
+
+    /// True if the call of the program in execution gave a value for that parameter, from 1.
+    pub(super) fn is_parameter_given(&self, number: usize) -> bool {
+        let given = self.levels.last().map_or(0, |waiting| waiting.values_given);
+        number > 0 && given & bit(number - 1) != 0
+    }
+
     /// Values of a call for the parameters of a program.
     fn bind(&mut self, call: &Call, unit: UnitId) -> Outcome<Given> {
         let head = self.head(unit)?;
@@ -249,6 +268,9 @@ impl Interpreter {
         given.save = head.header.as_ref().is_some_and(|header| header.save);
         for (at, parameter) in parameters.iter().enumerate() {
             let argument = call.arguments.get(at).and_then(Option::as_ref);
+            if argument.is_some() {
+                given.values_given |= bit(at);
+            }
             let whole = match argument {
                 None => self.default_of(parameter, head.line, &call.columns)?,
                 Some(argument) if parameter.by_reference => {
@@ -391,6 +413,7 @@ impl Interpreter {
             known: std::mem::replace(&mut self.known, memory),
             repeats: std::mem::take(&mut self.repeats),
             by_reference: given.by_reference,
+            values_given: given.values_given,
             saved: given.save.then(|| Box::new(self.modal.clone())),
             passes_left: passes,
             body: head.body,
@@ -571,4 +594,9 @@ fn check_type(whole: &Whole, parameter: &Parameter, columns: &Columns) -> Outcom
     let message = format!("the VAR parameter `{}` is {wanted}, this variable is {given}", parameter.name);
     Err(Fault::new(codes::BAD_ARGUMENT, columns.clone(), message)
         .label(format!("expected a variable of type {wanted}")))
+}
+
+/// The bit of a parameter, from 0; calls have far fewer than 128.
+fn bit(at: usize) -> u128 {
+    u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0)
 }

@@ -23,15 +23,7 @@ impl Interpreter {
                 Plane::G19 => 3,
             },
             8 => i32::from(self.zero_offset_number()) + 1,
-            10 => match modal.path_mode {
-                PathMode::ExactStop => 1,
-                PathMode::G64 => 2,
-                PathMode::G641 => 3,
-                PathMode::G642 => 4,
-                PathMode::G643 => 5,
-                PathMode::G644 => 6,
-                PathMode::G645 => 7,
-            },
+            10 => path_mode_number(modal.path_mode),
             12 => match modal.exact_stop {
                 ExactStop::Fine => 1,
                 ExactStop::Coarse => 2,
@@ -52,11 +44,7 @@ impl Interpreter {
             15 => self.feed_type_number(),
             19 => spline_end_number(self.curves.begin),
             20 => spline_end_number(self.curves.finish),
-            21 => match modal.acceleration_mode {
-                AccelerationMode::Brisk => 1,
-                AccelerationMode::Soft => 2,
-                AccelerationMode::Drive => 3,
-            },
+            21 => acceleration_number(modal.acceleration_mode),
             24 => {
                 if modal.feedforward_active {
                     2
@@ -78,14 +66,7 @@ impl Interpreter {
             },
             45 => 1 + i32::from(self.curves.with_path),
             55 => 1 + i32::from(modal.feed_modes.rapid_by_axis),
-            59 => match modal.dynamics {
-                DynamicsMode::Norm => 1,
-                DynamicsMode::Position => 2,
-                DynamicsMode::Rough => 3,
-                DynamicsMode::SemiFinish => 4,
-                DynamicsMode::Finish => 5,
-                DynamicsMode::Precision => 6,
-            },
+            59 => dynamics_number(modal.dynamics),
             1..=GROUPS => 1,
             _ => {
                 return Err(Fault::new(codes::BAD_INDEX, columns.clone(), format!("there is no G group {group}"))
@@ -131,7 +112,28 @@ impl Interpreter {
 
     /// 0 for G500, 1 for G54 and so on.
     fn zero_offset_number(&self) -> u16 {
-        0
+        self.modal.frames.number()
+    }
+}
+
+/// Member of group 21.
+fn acceleration_number(mode: AccelerationMode) -> i32 {
+    match mode {
+        AccelerationMode::Brisk => 1,
+        AccelerationMode::Soft => 2,
+        AccelerationMode::Drive => 3,
+    }
+}
+
+/// Member of group 59.
+fn dynamics_number(mode: DynamicsMode) -> i32 {
+    match mode {
+        DynamicsMode::Norm => 1,
+        DynamicsMode::Position => 2,
+        DynamicsMode::Rough => 3,
+        DynamicsMode::SemiFinish => 4,
+        DynamicsMode::Finish => 5,
+        DynamicsMode::Precision => 6,
     }
 }
 
@@ -141,5 +143,18 @@ fn spline_end_number(end: SplineEnd) -> i32 {
         SplineEnd::Natural => 1,
         SplineEnd::Tangential => 2,
         SplineEnd::Auto => 3,
+    }
+}
+
+/// Member of group 10.
+fn path_mode_number(mode: PathMode) -> i32 {
+    match mode {
+        PathMode::ExactStop => 1,
+        PathMode::G64 => 2,
+        PathMode::G641 => 3,
+        PathMode::G642 => 4,
+        PathMode::G643 => 5,
+        PathMode::G644 => 6,
+        PathMode::G645 => 7,
     }
 }

@@ -314,8 +314,8 @@ impl Interpreter {
 
     /// $P_PROG[level].
     fn program_at_level(&self, level: i32, columns: &Columns) -> Outcome<Value> {
-        if level == 0 {
-            return Ok(Value::Text(self.source.file_name().into()));
+        if let Some(name) = self.program_name_at(level.unsigned_abs() as usize) {
+            return Ok(Value::Text(name.into()));
         }
         Err(Fault::new(codes::BAD_INDEX, columns.clone(), format!("no program is active at level {level}"))
             .label("expected a level in use"))
@@ -323,11 +323,11 @@ impl Interpreter {
 
     /// 0 in the main program.
     fn level(&self) -> i32 {
-        0
+        self.levels.len() as i32
     }
 
     /// $P_SUBPAR[n].
-    fn parameter_given(&self, _number: i32) -> Value {
-        Value::Bool(false)
+    fn parameter_given(&self, number: i32) -> Value {
+        Value::Bool(self.is_parameter_given(number.unsigned_abs() as usize))
     }
 }

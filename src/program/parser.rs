@@ -386,6 +386,10 @@ impl<'a> WordParser<'_, 'a, '_> {
 
     fn system_variable(&mut self, name: &str) -> Outcome<WordKind> {
         let columns = self.columns();
+        if name.len() == 1 {
+            return Err(Fault::new(codes::UNKNOWN_SYSTEM_VARIABLE, columns, "`$` alone is no name")
+                .label("expected the name of a system variable"));
+        }
         let upper = name.to_ascii_uppercase();
         if let Some(digits) = upper.strip_prefix("$R") {
             if digits.is_empty() && self.lexer.take("[") {
