@@ -64,6 +64,33 @@ pub(super) struct Collected {
     stops: bool,
 }
 
+impl Collected {
+    /// An address stands once in a block, and AC, IC and their kin only where there is something to go to.
+    fn note_address(&mut self, address: Address, form: Form, columns: &Columns) -> Outcome<()> {
+        if !matches!(address, Address::M | Address::MOf(_) | Address::H) {
+            if self.addresses.contains(&address) {
+                return Err(Fault::new(codes::TWICE, columns.clone(), "this address is programmed twice in the block")
+                    .label("programmed again"));
+            }
+            self.addresses.push(address);
+        }
+        let has_form = matches!(
+            address,
+            Address::Axis(_)
+                | Address::Centre(_)
+                | Address::Intermediate(_)
+                | Address::PolarAngle
+                | Address::PolarRadius
+                | Address::Tool
+        );
+        if has_form || form == Form::Modal {
+            return Ok(());
+        }
+        Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "AC, IC and their kin are for axes")
+            .label("expected a plain value"))
+    }
+}
+
 impl Interpreter {
     /// Executes the words of a block.
     pub(super) fn words(&mut self, words: &[Word]) -> Outcome<()> {
@@ -275,13 +302,7 @@ impl Interpreter {
         columns: &Columns,
         block: &mut Collected,
     ) -> Outcome<()> {
-        if !matches!(address, Address::M | Address::MOf(_) | Address::H) {
-            if block.addresses.contains(&address) {
-                return Err(Fault::new(codes::TWICE, columns.clone(), "this address is programmed twice in the block")
-                    .label("programmed again"));
-            }
-            block.addresses.push(address);
-        }
+        block.note_address(address, value.form, columns)?;
         if address == Address::Tool {
             let name = self.tool(value)?;
             block.tool_loads |= self.select_tool(&name, columns)?;
@@ -291,19 +312,6 @@ impl Interpreter {
             return Ok(());
         }
         let typed = Typed(number(&value.value, self)?);
-        let has_form = matches!(
-            address,
-            Address::Axis(_)
-                | Address::Centre(_)
-                | Address::Intermediate(_)
-                | Address::PolarAngle
-                | Address::PolarRadius
-        );
-        let plain = has_form || value.form == Form::Modal;
-        if !plain {
-            return Err(Fault::new(codes::TYPE_MISMATCH, columns.clone(), "AC, IC and their kin are for axes")
-                .label("expected a plain value"));
-        }
         match address {
             Address::Axis(axis) => {
                 block.motion.axes[axis] = Some(AxisWord { typed, form: value.form, columns: columns.clone() });

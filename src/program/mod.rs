@@ -11,6 +11,7 @@ mod characters;
 pub mod codes;
 mod dialect;
 mod expression;
+mod g_functions;
 mod lexer;
 pub mod library;
 mod not_acted_on;
@@ -26,6 +27,8 @@ pub mod syntax;
 mod system_variables;
 pub mod text;
 pub mod visit;
+mod word_kinds;
+mod word_table;
 pub mod words;
 
 pub use codes::{Columns, Fault, Outcome};
