@@ -87,7 +87,7 @@ impl Scan {
             for (most, next) in [(&mut d1, state.first), (&mut d2, state.second), (&mut d3, state.third)] {
                 for (most, next) in most.as_mut_slice().iter_mut().zip(next.as_slice()) {
                     // A NaN stays, so that the planner refuses it.
-                    if !(next.abs() <= *most) {
+                    if next.abs() > *most || next.is_nan() {
                         *most = next.abs();
                     }
                 }

@@ -5,7 +5,7 @@
 use super::modal::Motion;
 use super::run::Interpreter;
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
-use crate::program::words::{Compressor, CurveWord, ExactStop, FeedShape, FeedType, Measure, Plane};
+use crate::program::words::{Compressor, CurveWord, ExactStop, FeedShape, FeedType, Measure, Plane, SplineEnd};
 use crate::program::{Columns, Fault, Outcome, codes};
 
 /// Number of G groups.
@@ -16,18 +16,7 @@ impl Interpreter {
     pub(super) fn active_g_function(&self, group: i32, columns: &Columns) -> Outcome<i32> {
         let modal = &self.modal;
         Ok(match group {
-            1 => match modal.motion {
-                Motion::Rapid => 1,
-                Motion::Line => 2,
-                Motion::Clockwise => 3,
-                Motion::CounterClockwise => 4,
-                Motion::Curve(CurveWord::ThreePoints) => 5,
-                Motion::Curve(CurveWord::Akima) => 6,
-                Motion::Curve(CurveWord::BSpline) => 7,
-                Motion::Curve(CurveWord::Cubic) => 8,
-                Motion::Curve(CurveWord::Polynomial) => 9,
-                Motion::Curve(CurveWord::Tangential) => 15,
-            },
+            1 => self.motion_number(),
             6 => match modal.plane {
                 Plane::G17 => 1,
                 Plane::G18 => 2,
@@ -61,6 +50,8 @@ impl Interpreter {
                 }
             }
             15 => self.feed_type_number(),
+            19 => spline_end_number(self.curves.begin),
+            20 => spline_end_number(self.curves.finish),
             21 => acceleration_number(modal.acceleration_mode),
             24 => {
                 if modal.feedforward_active {
@@ -81,6 +72,7 @@ impl Interpreter {
                 FeedShape::Linear => 2,
                 FeedShape::Cubic => 3,
             },
+            45 => 1 + i32::from(self.curves.with_path),
             55 => 1 + i32::from(modal.feed_modes.rapid_by_axis),
             59 => dynamics_number(modal.dynamics),
             1..=GROUPS => 1,
@@ -89,6 +81,22 @@ impl Interpreter {
                     .label(format!("expected 1 to {GROUPS}")));
             }
         })
+    }
+
+    /// Member of group 1.
+    fn motion_number(&self) -> i32 {
+        match self.modal.motion {
+            Motion::Rapid => 1,
+            Motion::Line => 2,
+            Motion::Clockwise => 3,
+            Motion::CounterClockwise => 4,
+            Motion::Curve(CurveWord::ThreePoints) => 5,
+            Motion::Curve(CurveWord::Akima) => 6,
+            Motion::Curve(CurveWord::BSpline) => 7,
+            Motion::Curve(CurveWord::Cubic) => 8,
+            Motion::Curve(CurveWord::Polynomial) => 9,
+            Motion::Curve(CurveWord::Tangential) => 15,
+        }
     }
 
     /// Member of group 15.
@@ -134,5 +142,14 @@ fn dynamics_number(mode: DynamicsMode) -> i32 {
         DynamicsMode::SemiFinish => 4,
         DynamicsMode::Finish => 5,
         DynamicsMode::Precision => 6,
+    }
+}
+
+/// Member of groups 19 and 20.
+fn spline_end_number(end: SplineEnd) -> i32 {
+    match end {
+        SplineEnd::Natural => 1,
+        SplineEnd::Tangential => 2,
+        SplineEnd::Auto => 3,
     }
 }

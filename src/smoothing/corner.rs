@@ -97,13 +97,15 @@ impl Rules {
         let angle_rad = turning_angle(&u.first, &v.first);
         let half_lu = 0.5 * before.curve.length_lu().min(after.curve.length_lu());
         let room = Room { half_lu, free_lu };
-        if !(angle_rad >= CORNER_ANGLE_MIN_RAD) {
+        // A NaN is no corner.
+        let turns = angle_rad >= CORNER_ANGLE_MIN_RAD;
+        if !turns {
             // Between two lines there is nothing to do; a compressed stretch has been made smooth.
             let smooth = |curve: &Curve| matches!(curve, Curve::Line(_) | Curve::Polynomial(_));
-            let step = (v.second - u.second).masked(&self.linear).norm();
+            let steps = (v.second - u.second).masked(&self.linear).norm() > CURVATURE_STEP_MIN_PER_MM;
             if mode != PathMode::G645
                 || (smooth(before.curve) && smooth(after.curve))
-                || !(step > CURVATURE_STEP_MIN_PER_MM)
+                || !steps
                 || before.curve.end() != after.curve.start()
             {
                 return Junction::Pass;
@@ -112,7 +114,8 @@ impl Rules {
             return self.polynomial(before, after, angle_rad, &room, &tolerances).unwrap_or(Junction::Pass);
         }
         // A tolerance or distance of 0 is G64.
-        if !(self.wanted_lu(before, after, &u.first, &v.first) > 0.0) {
+        let wanted = self.wanted_lu(before, after, &u.first, &v.first) > 0.0;
+        if !wanted {
             return Junction::Pass;
         }
         if self.turns_back(before.curve, &u.first, &v.first) {

@@ -187,7 +187,8 @@ impl<'a> Side<'a> {
         let state = curve.at(if leads_to { f64::INFINITY } else { 0.0 });
         let projected = plane.projected(&state.first);
         let plane_ratio = projected[0].hypot(projected[1]);
-        if curve.rotary_only() || !(plane_ratio > PLANE_MIN_RATIO) {
+        let moves = plane_ratio > PLANE_MIN_RATIO;
+        if curve.rotary_only() || !moves {
             return Err(Omitted::Shape);
         }
         let kind = match curve {

@@ -157,7 +157,10 @@ pub(super) fn per_axis(
     });
     let t_lu = reach.as_slice().iter().fold(0.0_f64, |most, t_lu| most.max(*t_lu));
     // An axis that turns and must not deviate leaves a corner.
-    let stuck = turn.as_slice().iter().zip(reach.as_slice()).any(|(turn, t_lu)| *turn != 0.0 && !(*t_lu > 0.0));
+    let stuck = turn.as_slice().iter().zip(reach.as_slice()).any(|(turn, t_lu)| {
+        let blends = *t_lu > 0.0;
+        *turn != 0.0 && !blends
+    });
     if stuck || !(t_lu > 0.0 && t_lu.is_finite()) {
         return None;
     }

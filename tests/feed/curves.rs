@@ -2,7 +2,6 @@
 
 use crate::support::{Program, Random, point, sample, spinner, total_s, with_rotary};
 use sollwert::base::{AxisVector, PartPoint, PerAxis};
-use sollwert::geometry::Curve;
 use sollwert::interpreter::{MoveKind, PolynomialGeometry, PolynomialPiece, SpatialArcGeometry};
 use sollwert::machine::{AccelerationMode, Machine, PathMode};
 use std::sync::Arc;
@@ -39,8 +38,8 @@ fn check(program: &Program, machine: &Machine, case: &str) {
         assert_eq!(last.axes[axis].position_lu, program.end().0[axis], "{case}");
         let limits = &machine.axis(axis).limits;
         let q = |i: usize| setpoints[i].axes[axis].position_lu;
-        for k in 1..setpoints.len() - 2 {
-            let at = format!("{case} tick {k} line {} axis {}", setpoints[k].path.block.line, axis.index());
+        for (k, setpoint) in setpoints.iter().enumerate().take(setpoints.len() - 2).skip(1) {
+            let at = format!("{case} tick {k} line {} axis {}", setpoint.path.block.line, axis.index());
             let v = (q(k + 1) - q(k)) / t_s;
             let a = (q(k + 1) - 2.0 * q(k) + q(k - 1)) / (t_s * t_s);
             let j = (q(k + 2) - 3.0 * q(k + 1) + 3.0 * q(k) - q(k - 1)) / (t_s * t_s * t_s);
@@ -48,7 +47,7 @@ fn check(program: &Program, machine: &Machine, case: &str) {
             assert!(a.abs() <= limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "{at}: a {a}");
             // Rounding of positions of up to 100 mm: 1e-14 mm / t_s³, a few times; the arc length is good to 1e-12.
             assert!(j.abs() <= limits.jerk_max_lu_s3 * (1.0 + 1e-3) + 10.0, "{at}: j {j}");
-            let exact = &setpoints[k].axes[axis];
+            let exact = &setpoint.axes[axis];
             assert!(exact.velocity_lu_s.abs() <= limits.velocity_max_lu_s * (1.0 + 1e-9), "{at}");
             assert!(exact.acceleration_lu_s2.abs() <= limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "{at}");
             assert!(exact.jerk_lu_s3.abs() <= limits.jerk_max_lu_s3 * (1.0 + 1e-6), "{at}: {}", exact.jerk_lu_s3);
@@ -173,7 +172,7 @@ fn a_tight_place_holds_only_what_is_near() {
     assert_eq!(block.iter().map(|piece| piece.path.contour.blocks_begun).sum::<u32>(), 1);
     assert!(block[..block.len() - 1].iter().all(|piece| !piece.path.contour.stop_at_end));
     for pair in block.windows(2) {
-        let curve = |at: usize| pair[at].path.contour.curve().map(Curve::clone);
+        let curve = |at: usize| pair[at].path.contour.curve().cloned();
         assert_eq!(curve(0).map(|curve| curve.end()), curve(1).map(|curve| curve.start()));
     }
     let speeds: Vec<f64> = block.iter().map(|piece| piece.law.at(piece.law.duration_s() / 2.0).velocity_lu_s).collect();

@@ -6,6 +6,7 @@
 mod closed_forms;
 mod contour;
 mod corners;
+mod curves;
 mod drives;
 mod figures;
 mod limits;

@@ -1,0 +1,97 @@
+//! Splines, polynomials and circles in space from NC text to set-points: limits of every axis by differences, points that are met.
+//!
+//! CSPLINE and BSPLINE SD=3 go on with their curvature from block to block, so that the limits hold across the borders of blocks as well,
+//! without any allowance; all other blocks rest at their ends here.
+
+use crate::replay::{MACHINES, machine, source};
+use sollwert::kernel::{Kernel, Status};
+use sollwert::machine::Machine;
+use std::sync::Arc;
+
+/// Positions of all axes at every set-point, with the line.
+fn setpoints(machine: &Machine, text: &str) -> Vec<(u32, Vec<f64>)> {
+    let mut kernel = Kernel::new(Arc::new(machine.clone()), source(text), false);
+    let mut rows = Vec::new();
+    while kernel.cycle().unwrap() == Status::Running {
+        let setpoint = kernel.output().setpoint.unwrap();
+        let q = machine.axis_ids().map(|axis| setpoint.axes[axis].position_lu).collect();
+        rows.push((setpoint.path.block.line, q));
+    }
+    assert!(kernel.take_findings().alarm.is_none(), "{text}");
+    rows
+}
+
+/// No axis beyond velocity, acceleration and jerk anywhere.
+fn within_limits(machine: &Machine, rows: &[(u32, Vec<f64>)], text: &str) {
+    let t_s = machine.cycle.time_base.setpoint_period_s();
+    for (i, axis) in machine.axes.iter().enumerate() {
+        let limits = &axis.limits;
+        let q = |k: usize| rows[k].1[i];
+        for (k, (line, _)) in rows.iter().enumerate().take(rows.len() - 2).skip(1) {
+            let v = (q(k + 1) - q(k)) / t_s;
+            let a = (q(k + 1) - 2.0 * q(k) + q(k - 1)) / t_s.powi(2);
+            let j = (q(k + 2) - 3.0 * q(k + 1) + 3.0 * q(k) - q(k - 1)) / t_s.powi(3);
+            let at = format!("{} in line {}, {} s\n{text}", axis.name, line, k as f64 * t_s);
+            assert!(v.abs() <= limits.velocity_max_lu_s * (1.0 + 1e-9), "velocity {v} of {at}");
+            assert!(a.abs() <= limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "acceleration {a} of {at}");
+            // Rounding of positions and of the arc length: 1e-12 mm.
+            let noise = 8e-12 / t_s.powi(3);
+            assert!(j.abs() <= limits.jerk_max_lu_s3 * (1.0 + 1e-3) + noise, "jerk {j} of {at}");
+        }
+    }
+}
+
+/// Points of a contour with long and short steps.
+fn points() -> Vec<[f64; 3]> {
+    let waves =
+        |i: f64| [6.0 * i + (1.7 * i).sin(), 25.0 * (0.5 * i).sin() + (2.3 * i).cos(), 30.0 + 4.0 * (0.9 * i).cos()];
+    (0..40).map(|i| waves(f64::from(i))).collect()
+}
+
+#[test]
+fn smooth_splines_keep_all_limits_across_their_blocks() {
+    let points = points();
+    let lines: String = points[1..].iter().map(|[x, y, z]| format!("X{x:.4} Y{y:.4} Z{z:.4}\n")).collect();
+    let [x, y, z] = points[0];
+    for name in MACHINES {
+        let machine = machine(name, &[]);
+        for word in ["CSPLINE", "BSPLINE", "CSPLINE BAUTO EAUTO"] {
+            let text = format!("G60 G0 X{x} Y{y} Z{z}\nG64 F9000\n{word}\n{lines}G9 X250 Y0\nG60 G1 X260\nM30\n");
+            let rows = setpoints(&machine, &text);
+            within_limits(&machine, &rows, &text);
+            if word.starts_with('C') {
+                // 150 mm/s and 2 to 4 ms: no set-point may be further from the nearest than half of a step.
+                let step = 150.0 * machine.cycle.time_base.setpoint_period_s();
+                for p in &points[1..] {
+                    let nearest = rows.iter().map(|(_, q)| (0..3).map(|i| (q[i] - p[i]).powi(2)).sum::<f64>().sqrt());
+                    let nearest = nearest.fold(f64::INFINITY, f64::min);
+                    assert!(nearest <= 0.51 * step + 1e-4, "{name} {word}: {nearest} mm from {p:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn polynomials_circles_in_space_and_akima_keep_all_limits() {
+    let text = "\
+G60 G0 X0 Y0 Z10
+G1 F12000
+POLY PO[X]=(40, 30, -20) PO[Y]=(10, -60, 80, 5) Z20
+PO[X]=(0,-10) PO[Y]=(20) PO[]=(2,1) PL=1
+X0 Y0 PO[Z]=(5, 3, -2, 1, 4) PL=2.5
+CIP X10 Y10 Z25 I1=20 J1=-3 K1=9
+CIP X0 Y0 Z5 I1=-5 J1=12 K1=30 TURN=1
+ASPLINE X10 Y20
+X30 Y10 Z0
+X40 Y40
+X70 Y0 Z8
+G1 X80
+CT X90 Y20
+M30
+";
+    for name in MACHINES {
+        let machine = machine(name, &[]);
+        within_limits(&machine, &setpoints(&machine, text), text);
+    }
+}
