@@ -102,7 +102,7 @@ fn wrong_arcs_are_alarms_that_name_both_radii() {
         ("G1 X10 F1\nG3 CR=5", "E0505", "full circle"),
         ("G1 X10 F1\nG3 X0 Y10 I-10 CR=10", "E0207", "centre and radius"),
         ("G1 X10 F1 I5", "E0207", "without G2 or G3"),
-        ("G2 X1 I1", "E0501", "no F"),
+        ("G2 X2 I1", "E0501", "no F"),
         ("G1 X10 F1\nG3 X9.9999 Y0 I-50", "E0504", "not on the circle"),
     ];
     for (text, code, message) in cases {

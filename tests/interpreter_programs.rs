@@ -200,10 +200,13 @@ fn a_cam_program_runs_from_first_to_last_block() {
         "33 function X-12.5 Y-58 Z-0.009 B10 C-90 stops M30",
     ];
     assert_eq!(result.lines(), wanted);
-    assert!(result.moves.iter().all(|shown| shown.modes.path_mode == PathMode::ExactStop));
+    // CYCLE832 with mode 1: finishing, G645 with the tolerance; before it the exact stop of the machine.
+    let modes = |line: u32| &result.moves.iter().find(|shown| shown.block.line == line).expect("a move").modes;
+    assert_eq!(modes(17).path_mode, PathMode::ExactStop);
+    assert_eq!((modes(21).path_mode, modes(21).contour_tolerance_mm), (PathMode::G645, Some(0.02)));
     let reported: Vec<_> =
         result.warnings.iter().map(|warning| (warning.line(), warning.message.split('`').nth(1).unwrap())).collect();
-    assert_eq!(reported, [(6, "CYCLE800"), (12, "D1"), (18, "CYCLE832"), (27, "MCALL"), (27, "CYCLE81")]);
+    assert_eq!(reported, [(6, "CYCLE800"), (12, "D1"), (27, "CYCLE81")]);
     assert!(
         check(&ProgramSource::from_bytes("cam.mpf", CAM.as_bytes()), &xyzbc())
             .iter()

@@ -127,6 +127,19 @@ fn the_priority_of_and_is_warned_of() {
 }
 
 #[test]
+fn a_late_definition_is_warned_of() {
+    let warned = |text: &str| {
+        let mut interpreter = Interpreter::new(ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
+        while interpreter.next_move().expect("no alarm").is_some() {}
+        let lines = interpreter.take_warnings().into_iter().filter(|finding| finding.code == "W0006");
+        lines.map(|finding| finding.line()).collect::<Vec<_>>()
+    };
+    assert!(warned("; comment\nDEF REAL FIRST\nN10 DEF INT SECOND=3\nG0 X1\n").is_empty());
+    assert_eq!(warned("DEF REAL FIRST\nG0 X1\nDEF INT SECOND\nDEF INT THIRD\n"), [3]);
+    assert_eq!(warned("R1=5\nDEF INT SECOND\n"), [2]);
+}
+
+#[test]
 fn global_variables_come_from_definition_files() {
     let source = |name: &str, text: &str| ProgramSource::from_bytes(name, text.as_bytes());
     let file = "%_N_UGUD_DEF\n;$PATH=/_N_DEF_DIR\nDEF NCK SYNR APW 3 REAL DEPTH=-12.5 LLI -20 ULI 0\nDEF CHAN INT COUNT[3]=SET(1,2,3)\nM17\n";

@@ -171,6 +171,20 @@ impl Interpreter {
         case.default.as_ref().map_or(Ok(()), |jump| self.jump(jump))
     }
 
+    /// Alarm 12161 of the control: here the variable is made all the same. Only of the main program, once a run.
+    fn warn_of_late_definition(&mut self, definition: &Definition) {
+        let is_late = self.main_begun && !self.in_definitions && self.levels.is_empty();
+        if let Some(first) = definition.variables.first().filter(|_| is_late)
+            && self.first_report(codes::LATE_DEFINITION)
+        {
+            let fault =
+                Fault::new(codes::LATE_DEFINITION, first.columns.clone(), "this DEF stands behind an executable block")
+                    .label("too late for the control")
+                    .help("move all DEF to the start of the program");
+            self.warn(*fault);
+        }
+    }
+
     pub(super) fn define(&mut self, definition: &Definition) -> Outcome<()> {
         if definition.global && self.globals_defined_here() {
             let columns = definition.variables.first().map_or(0..0, |variable| variable.columns.clone());
@@ -182,6 +196,7 @@ impl Interpreter {
             .label("global in a program")
             .help("leave NCK or CHAN away, or give the file with --gud"));
         }
+        self.warn_of_late_definition(definition);
         for variable in &definition.variables {
             let dimensions = integers(&variable.dimensions, self)?;
             let at = (self.current.line, &variable.columns);

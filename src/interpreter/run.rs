@@ -92,6 +92,8 @@ pub struct Interpreter {
     rests_for_main_run: bool,
     /// The definition files have been executed.
     globals_defined: bool,
+    /// An executable block of the main program has been met: a DEF comes too late for the control.
+    pub(super) main_begun: bool,
     /// A definition file is being executed.
     pub(super) in_definitions: bool,
     /// Moves of the block in execution.
@@ -180,6 +182,7 @@ impl Interpreter {
             trace_events: Vec::new(),
             rests_for_main_run: false,
             globals_defined: false,
+            main_begun: false,
             in_definitions: false,
             queue: VecDeque::new(),
             library: Library::new(source.clone(), setup.directories.clone(), setup.shipped),
@@ -283,6 +286,7 @@ impl Interpreter {
         if let Some(plain) = plain_block(&bytes, &self.dialect)
             && self.plain_move(&plain)
         {
+            self.main_begun = true;
             return if self.modal_call.is_some() { self.after_motion() } else { Ok(()) };
         }
         let skipped = self.setup.skip_levels;
@@ -300,6 +304,8 @@ impl Interpreter {
         self.rests_for_main_run = false;
         if block.statement != Statement::Words(Vec::new()) {
             self.number += 1;
+            self.main_begun |=
+                !matches!(block.statement, Statement::Define(_) | Statement::Procedure(_) | Statement::External(_));
         }
         let depth = self.levels.len();
         self.execute(&block.statement)?;
