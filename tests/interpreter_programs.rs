@@ -208,7 +208,7 @@ fn a_cam_program_runs_from_first_to_last_block() {
         result.warnings.iter().map(|warning| (warning.line(), warning.message.split('`').nth(1).unwrap())).collect();
     assert_eq!(reported, [(6, "CYCLE800"), (12, "D1"), (27, "CYCLE81")]);
     assert!(
-        check(&ProgramSource::from_bytes("cam.mpf", CAM.as_bytes()), &xyzbc())
+        check(ProgramSource::from_bytes("cam.mpf", CAM.as_bytes()), &xyzbc())
             .iter()
             .all(|found| found.severity == Severity::Warning)
     );

@@ -72,7 +72,7 @@ fn one_mistake_is_one_finding_at_its_place() {
         let text = std::fs::read_to_string(&path).unwrap();
         let wanted = wanted(&text);
         assert_eq!(wanted.len(), 1, "{name}");
-        let found = check(&ProgramSource::from_bytes(&name, text.as_bytes()), &xyz());
+        let found = check(ProgramSource::from_bytes(&name, text.as_bytes()), &xyz());
         let fault = match &found[..] {
             [one] => compare(one, &wanted[0]),
             [] => Some("no finding"),

@@ -47,7 +47,7 @@ fn an_unreadable_file_is_told() {
 
 /// Line, code and marked text of all errors.
 fn errors(text: &str) -> Vec<(u32, &'static str, String)> {
-    let found = check(&ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
+    let found = check(ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
     let errors = found.iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
     errors
         .map(|diagnostic| {
@@ -103,7 +103,7 @@ fn lines_that_are_never_executed_are_checked_too() {
 #[test]
 fn nearest_words_are_offered() {
     let help = |text: &str| {
-        check(&ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz())[0].help.clone().unwrap_or_default()
+        check(ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz())[0].help.clone().unwrap_or_default()
     };
     assert!(help("GOTOX LAB").contains("GOTOF") || help("GOTOX LAB").contains("GOTO"), "{}", help("GOTOX LAB"));
     assert!(help("R1=SQTR(4)").contains("SQRT"));
@@ -113,21 +113,21 @@ fn nearest_words_are_offered() {
     assert!(help("G1 X1O F1").contains("digit 0"));
     assert!(help("G1 X1,5 F1").contains("point"));
     assert!(help("XR1").is_empty() || !help("XR1").contains("Sn="));
-    let call = check(&ProgramSource::from_bytes("a.mpf", *b"PLATE_CONTOUR(5)"), &xyz());
+    let call = check(ProgramSource::from_bytes("a.mpf", *b"PLATE_CONTOUR(5)"), &xyz());
     assert!(call[0].code == "E0206" && call[0].message.contains("sub-program"), "{}", call[0].message);
 }
 
 #[test]
 fn a_check_reports_each_finding_once_in_order() {
     let text = "G1 X500 F100\nCYCLE800(0.1)\nX499\nY1 G41\nR1=1/R2\nG41";
-    let found = check(&ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
+    let found = check(ProgramSource::from_bytes("a.mpf", text.as_bytes()), &xyz());
     let shown: Vec<_> = found.iter().map(|diagnostic| (diagnostic.line(), diagnostic.code)).collect();
     assert_eq!(shown, [(1, "W0002"), (2, "W0001"), (4, "W0001"), (5, "E0304")]);
 }
 
 #[test]
 fn a_check_of_an_endless_program_ends() {
-    let found = check(&ProgramSource::from_bytes("a.mpf", *b"LOOP\nG0 X1\nX2\nENDLOOP"), &xyz());
+    let found = check(ProgramSource::from_bytes("a.mpf", *b"LOOP\nG0 X1\nX2\nENDLOOP"), &xyz());
     assert_eq!(
         found.iter().map(|diagnostic| (diagnostic.code, diagnostic.severity)).collect::<Vec<_>>(),
         [("W0003", Severity::Note)]
@@ -302,7 +302,7 @@ proptest! {
     #[test]
     fn random_bytes_never_break_anything(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
         run_bytes(&bytes, &xyzbc());
-        for diagnostic in check(&ProgramSource::from_bytes("r.mpf", bytes), &xyzbc()) {
+        for diagnostic in check(ProgramSource::from_bytes("r.mpf", bytes), &xyzbc()) {
             diagnostic.render(false);
         }
     }

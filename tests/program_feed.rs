@@ -317,10 +317,10 @@ fn flin_and_fcub_lead_from_one_f_to_the_next() {
     let found = moves(&m, "F600\nG1 X10\nFLIN\nX20 F1200\nX30\nFCUB X40 F600\nFNORM X50 F1200\nM30\n");
     let found: Vec<Vec<f64>> = motions(&found).iter().map(|next| feeds(next)).collect();
     assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [1, 32, 1, 32, 1]);
-    for i in 0..32 {
+    for (i, (linear, cubic)) in found[1].iter().zip(&found[3]).enumerate() {
         let u = (i as f64 + 0.5) / 32.0;
-        close(found[1][i], 10.0 + 10.0 * u);
-        close(found[3][i], 20.0 - 10.0 * (3.0 * u * u - 2.0 * u * u * u));
+        close(*linear, 10.0 + 10.0 * u);
+        close(*cubic, 20.0 - 10.0 * (3.0 * u * u - 2.0 * u * u * u));
     }
     close(found[2][0], 20.0);
     close(found[4][0], 20.0);

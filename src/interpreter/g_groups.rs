@@ -67,7 +67,7 @@ impl Interpreter {
             45 => 1 + i32::from(self.curves.with_path),
             55 => 1 + i32::from(modal.feed_modes.rapid_by_axis),
             59 => dynamics_number(modal.dynamics),
-            1..=GROUPS => 1,
+            group if (1..=GROUPS).contains(&group) => 1,
             _ => {
                 return Err(Fault::new(codes::BAD_INDEX, columns.clone(), format!("there is no G group {group}"))
                     .label(format!("expected 1 to {GROUPS}")));

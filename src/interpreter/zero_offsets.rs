@@ -22,7 +22,7 @@ impl ZeroOffsets {
         self.basic.clone().unwrap_or_else(|| Frame::identity(axes))
     }
 
-    /// $P_UIFR[number]: 0 is G500, 1 is G54, 5 is G505.
+    /// `$P_UIFR[number]`: 0 is G500, 1 is G54, 5 is G505.
     pub fn settable(&self, number: u16, axes: GeometryAxes) -> Frame {
         self.settable.get(&number).cloned().unwrap_or_else(|| Frame::identity(axes))
     }
@@ -32,7 +32,7 @@ impl ZeroOffsets {
         self.basic = Some(frame);
     }
 
-    /// Sets $P_UIFR[number], up to [`SETTABLE_MAX`].
+    /// Sets `$P_UIFR[number]`, up to [`SETTABLE_MAX`].
     pub fn set_settable(&mut self, number: u16, frame: Frame) {
         if number <= SETTABLE_MAX {
             self.settable.insert(number, frame);

@@ -236,7 +236,7 @@ pub enum WordKind {
     Address(Address, AddressValue),
     /// A word that stands alone.
     Keyword(Keyword),
-    /// NAME[index]=value; without index where the word allows it.
+    /// `NAME[index]=value`; without index where the word allows it.
     Indexed {
         /// Which.
         address: IndexedAddress,
@@ -428,7 +428,7 @@ pub enum ExprKind {
         /// Indices.
         indices: Vec<Expr>,
     },
-    /// $P_EP[X] and so on.
+    /// `$P_EP[X]` and so on.
     System(SystemName),
     /// -a, +a, NOT a, B_NOT a.
     Unary(Unary, Box<Expr>),

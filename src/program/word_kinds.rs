@@ -164,7 +164,7 @@ pub enum Suppression {
     All,
 }
 
-/// NAME[axis]=value.
+/// `NAME[axis]=value`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IndexedAddress {
     /// AX: an axis word whose axis is computed.

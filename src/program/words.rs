@@ -19,7 +19,7 @@ pub enum Role {
     Keyword(Keyword),
     /// NAME=value, acted on.
     Address(Address),
-    /// NAME[axis]=value, acted on.
+    /// `NAME[axis]=value`, acted on.
     Indexed(IndexedAddress),
     /// NAME(arguments), acted on.
     Procedure(Procedure),
