@@ -17,6 +17,7 @@
 use super::evaluate::{evaluate, integers};
 use super::flow::Repeat;
 use super::modal::Modal;
+use super::parameters::{bit, check_type, whole_type};
 use super::run::{Interpreter, Memory};
 use super::value::Value;
 use super::variables::Whole;
@@ -576,27 +577,4 @@ fn text_of(header: &Header) -> String {
         format!("{by}{} {}", parameter.variable_type.name(), parameter.name)
     });
     format!("PROC {}({})", header.name, parameters.collect::<Vec<_>>().join(", "))
-}
-
-/// A text handed over by VAR keeps its own length.
-fn whole_type(parameter: &Parameter, whole: &Whole) -> VariableType {
-    match (parameter.variable_type, whole.variable_type()) {
-        (VariableType::Text(_), own @ VariableType::Text(_)) => own,
-        (wanted, _) => wanted,
-    }
-}
-
-fn check_type(whole: &Whole, parameter: &Parameter, columns: &Columns) -> Outcome<()> {
-    let (given, wanted) = (whole.variable_type().name(), parameter.variable_type.name());
-    if given == wanted {
-        return Ok(());
-    }
-    let message = format!("the VAR parameter `{}` is {wanted}, this variable is {given}", parameter.name);
-    Err(Fault::new(codes::BAD_ARGUMENT, columns.clone(), message)
-        .label(format!("expected a variable of type {wanted}")))
-}
-
-/// The bit of a parameter, from 0; calls have far fewer than 128.
-fn bit(at: usize) -> u128 {
-    u32::try_from(at).ok().and_then(|at| 1_u128.checked_shl(at)).unwrap_or(0)
 }

@@ -6,7 +6,7 @@
 
 use super::call::missing;
 use super::flow::unbalanced;
-use super::run::Interpreter;
+use super::run::{Interpreter, priority_fault};
 use super::setup::Setup;
 use super::variables::undeclared;
 use crate::base::diagnostics::nearest;
@@ -17,6 +17,7 @@ use crate::program::structure::Structure;
 use crate::program::syntax::{
     Block, Call, Callee, Destination, Expr, ExprKind, Initial, Jump, Statement, Target, WordKind,
 };
+use crate::program::visit::priority_trap;
 use crate::program::{
     Columns, Cursor, Dialect, Fault, Library, Line, ProgramSource, UnitId, Window, codes, parse, visit_names,
 };
@@ -40,16 +41,16 @@ pub fn check(setup: impl Into<Setup>, machine: &Machine) -> Vec<Diagnostic> {
     for unit in &units {
         let source = library.source(*unit).clone();
         let typos = every_line(&source, &dialect);
+        let missing = calls(*unit, &mut library, &dialect);
+        // A typo in ENDIF looks like a call: what it leaves without a partner is its consequence.
+        let misspelt = missing.iter().any(|finding| finding.code == codes::UNKNOWN_WORD);
         if typos.is_empty() {
-            let missing = calls(*unit, &mut library, &dialect);
-            // A typo in ENDIF looks like a call: what it leaves without a partner is its consequence.
-            let misspelt = missing.iter().any(|finding| finding.code == codes::UNKNOWN_WORD);
             let others = names_and_partners(&source, &setup, &dialect);
             found.extend(others.into_iter().filter(|finding| !(misspelt && finding.code == codes::UNBALANCED)));
-            found.extend(missing);
-            is_sound &= !misspelt;
         }
-        is_sound &= typos.is_empty();
+        found.extend(missing);
+        found.extend(traps(&source, &dialect));
+        is_sound &= typos.is_empty() && !misspelt;
         found.extend(typos);
     }
     run(&setup, machine, is_sound, &mut found);
@@ -166,6 +167,18 @@ fn every_line(source: &ProgramSource, dialect: &Dialect) -> Vec<Diagnostic> {
     let parsed =
         lines(source).filter_map(|(cursor, line)| Some((cursor, parse(&source.decode(&line), dialect).err()?)));
     parsed.map(|(cursor, fault)| placed(source, cursor, *fault)).collect()
+}
+
+/// Conditions that are read otherwise than they look.
+fn traps(source: &ProgramSource, dialect: &Dialect) -> Vec<Diagnostic> {
+    let found = lines(source).filter_map(|(cursor, line)| {
+        let block =
+            if plain_block(&line, dialect).is_some() { None } else { parse(&source.decode(&line), dialect).ok() };
+        let mut finding = placed(source, cursor, *priority_fault(priority_trap(&block?.statement)?));
+        finding.severity = Severity::Warning;
+        Some(finding)
+    });
+    found.collect()
 }
 
 /// Names of components of frames stand in brackets only.

@@ -40,6 +40,7 @@ mod listing_curves;
 mod modal;
 mod motion;
 mod path_feed;
+mod parameters;
 mod path_words;
 mod placement;
 mod positioning;

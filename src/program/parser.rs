@@ -170,7 +170,10 @@ impl<'a> WordParser<'_, 'a, '_> {
             let mut ahead = *self.lexer;
             let is_comma = ahead.token()? == Token::Symbol(",");
             let help = (is_comma && self.behind_digit).then(|| "the decimal sign is a point".to_owned());
-            return Err(expected(self.lexer, "a word such as G1 or X10").maybe_help(help));
+            let is_bracket = self.lexer.peek() == Token::Symbol("(");
+            let comment =
+                is_bracket.then(|| "a comment begins with `;`: brackets are comments in other dialects".to_owned());
+            return Err(expected(self.lexer, "a word such as G1 or X10").maybe_help(help.or(comment)));
         };
         match name.as_bytes() {
             [b'$', ..] => self.system_variable(name),
