@@ -39,6 +39,8 @@ def measured(arguments):
 
 
 def main():
+    if len(sys.argv) < 3 or not sys.argv[1].isdigit():
+        sys.exit(__doc__)
     blocks, name = int(sys.argv[1]), sys.argv[2]
     write(blocks, name)
     if "--memory" not in sys.argv[3:]:

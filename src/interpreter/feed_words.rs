@@ -191,6 +191,11 @@ impl Interpreter {
                 .label("expected one value"));
         };
         if matches!(address, IndexedAddress::SpindlePosition | IndexedAddress::SpindlePositionAsync) {
+            if self.first_report(codes::SPINDLE_TIME) {
+                let message = "SPOS is recorded and takes no time: the machine file has no data of the spindle";
+                let fault = Fault::new(codes::SPINDLE_TIME, columns.clone(), message).label("takes no time");
+                self.warn(*fault);
+            }
             return self.position_spindle(address, index, value, block);
         }
         let Some(index) = index else {

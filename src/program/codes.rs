@@ -125,4 +125,5 @@ codes! {
     PRIORITY_TRAP "W0005" "AND, OR or XOR beside a comparison, without brackets";
     LATE_DEFINITION "W0006" "A DEF behind the first executable block";
     RAISED_AND_SHOWN "W0007" "An alarm of the program that does not stop it (SETAL)";
+    SPINDLE_TIME "W0008" "A spindle position that takes no time";
 }
