@@ -5,7 +5,8 @@
 //!
 //! An interval is cut in two until the derivatives in its middle are those between its ends to [`MISSED_RATIO`] of the greatest
 //! demand there (or of what would bind at all). A parabola that passes this test rises above its samples by a quarter of that at
-//! most; [`RESERVE_RATIO`] is added for curves that are no parabola. Tests compare with a far finer sampling.
+//! most; [`RESERVE_RATIO`] is added for curves that are no parabola. This is a reserve, not a proof;
+//! the tests check the limits by differences of set-points.
 //! Does not choose where to change the speed: that is `split`.
 
 use super::limits::{AxisRules, FeedCap};
