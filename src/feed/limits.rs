@@ -213,7 +213,7 @@ impl AxisRules {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
             Curve::Arc(arc) => self.curved(&Worst::on_arc(arc), in_block, feed, jerk_limited),
             Curve::SpatialArc(arc) => self.curved(&Worst::on_spatial_arc(arc), in_block, feed, jerk_limited),
-            Curve::Polynomial(_) => match worst {
+            Curve::Polynomial(_) | Curve::Quintic(_) => match worst {
                 Some(worst) => self.curved(worst, if ends.blend { in_blend } else { in_block }, feed, jerk_limited),
                 // Unknown demands allow nothing: the planner refuses the piece.
                 None => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),

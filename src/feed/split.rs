@@ -41,7 +41,7 @@ struct Stretch {
 pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
     let curve = match &path.contour.kind {
         PieceKind::Block(Curve::Polynomial(curve)) => curve,
-        PieceKind::Blend(Curve::Polynomial(_), _) => {
+        PieceKind::Blend(Curve::Polynomial(_) | Curve::Quintic(_), _) => {
             let scan = scan(rules, &path);
             let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1)));
             return vec![Part { path, worst }];

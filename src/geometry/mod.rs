@@ -9,6 +9,7 @@ mod curve;
 mod line;
 mod polynomial;
 mod quadrature;
+mod quintic;
 mod rational;
 mod spatial_arc;
 
@@ -17,4 +18,5 @@ pub use blend::{BlendPoint, HermiteBlend};
 pub use curve::{Curve, CurveState, DISPLACEMENT_MIN_LU};
 pub use line::Line;
 pub use polynomial::PolynomialCurve;
+pub use quintic::{QuinticBlend, QuinticShape};
 pub use spatial_arc::SpatialArc;
