@@ -143,9 +143,9 @@ impl Planner {
 
     /// A piece whose F is the same all along.
     fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
-        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_)));
+        let scanned = matches!(path.contour.curve(), Some(Curve::Polynomial(_))) || !path.is_contour();
         // A length that is no number is refused as it is.
-        if !polynomial || !path.length_lu().is_finite() {
+        if !scanned || !path.length_lu().is_finite() {
             return self.push_part(Part { path, worst: None });
         }
         let rules = self.rules.of(&path.contour.modes);
