@@ -177,6 +177,20 @@ impl ArcLengthTable {
         u
     }
 
+    /// Arc length of the first piece up to u.
+    pub fn length_at(&self, u: f64) -> f64 {
+        let first = self.panels.iter().take_while(|panel| panel.piece == 0);
+        let Some(panel) = first.filter(|panel| panel.ends_ratio[0] <= u).last() else { return 0.0 };
+        let [u0, u1] = panel.ends_ratio;
+        let u = u.min(u1);
+        let piece = &self.geometry.pieces[panel.piece];
+        if u - u0 < u1 - u {
+            panel.lengths_lu[0] + self.length_between(piece, u0, u)
+        } else {
+            panel.lengths_lu[1] - self.length_between(piece, u, u1)
+        }
+    }
+
     fn speed(&self, piece: &PolynomialPiece, u: f64) -> f64 {
         speed(piece, &self.linear, &self.counted, u)
     }

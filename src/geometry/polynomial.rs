@@ -99,6 +99,11 @@ impl PolynomialCurve {
         state
     }
 
+    /// Arc length of the first piece up to its parameter u; meant for whole curves.
+    pub fn length_at_lu(&self, u: f64) -> f64 {
+        self.table.length_at(u).max(0.0).min(self.length_lu)
+    }
+
     /// Places between which the curve is smooth and changes little, in order, without the ends: where the quadrature had to be cut.
     pub fn nodes_lu(&self) -> impl Iterator<Item = f64> {
         let borders = self.own_panels().iter().map(|panel| panel.lengths_lu[0] - self.offset_lu);

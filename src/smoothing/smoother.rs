@@ -352,7 +352,7 @@ impl Smoother {
     /// Hands over what waits for a corner or for the compressor.
     fn end_stages(&mut self, out: &mut impl FnMut(ContourPiece)) {
         self.leave_corner(out);
-        self.compression.flush(&self.rules);
+        self.compression.flush();
         self.link_compressed(out);
     }
 
