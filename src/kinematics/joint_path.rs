@@ -6,12 +6,18 @@
 
 use super::{JointPath, JointState};
 use crate::base::{AxisVector, MachinePoint};
+use crate::geometry::Curve;
 use crate::smoothing::PieceKind;
 
 impl JointPath {
     /// Length of the parameter s: mm of the linear axes, rad where only rotary axes move, 0 for a wait.
     pub fn length_lu(&self) -> f64 {
         self.contour.curve().map_or(0.0, |curve| curve.length_lu())
+    }
+
+    /// True where every axis moves in proportion to s: the derivatives are the same all along.
+    pub fn is_straight(&self) -> bool {
+        matches!(self.contour.curve(), Some(Curve::Line(_)))
     }
 
     /// Posture and derivatives at s, clamped to the ends of the piece.
