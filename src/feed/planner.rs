@@ -288,7 +288,11 @@ impl Planner {
             }
             continuous.plan(&mut pieces);
         }
-        continuous.take_front()
+        let law = continuous.take_front();
+        if std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "4") && let Some(law) = &law && let Some(front) = entries.front() {
+            continuous.debug_front(law, &front.path);
+        }
+        law
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.

@@ -73,14 +73,26 @@ const ATTEMPTS_MAX: u32 = 6;
 /// How far below the share that would just do.
 const TIGHTER_RATIO: f64 = 0.995;
 
+/// By how much limits give way, of what planning does not use of them anyway.
+const LOOSER_RATIOS: [f64; 3] = [0.0, 2e-4, 1.5e-3];
+
 /// Share of the estimate to begin with.
 const START_RATIO: f64 = 0.95;
 
 /// b stays above this share of its estimate.
 const LOWEST_RATIO: f64 = 1e-6;
 
-/// Share of the acceleration with which the first estimate changes its speed.
-const ESTIMATE_SHARE: f64 = 0.8;
+/// Rounds for the time of an interval in the first estimate.
+const PACE_ROUNDS: usize = 3;
+
+/// Derivatives on the curve of an interval, by its number and s from the start of its piece.
+pub(super) type Look<'a> = dyn Fn(usize, f64) -> Derivatives + 'a;
+
+/// A limit that is used so far at the eighths of an interval holds between them.
+const HELD_RATIO: f64 = 0.9995;
+
+/// Above this use of a limit the curve itself is looked at.
+const NEAR_RATIO: f64 = 0.9;
 
 /// Memory for planning, used again and again.
 #[derive(Clone, Debug, Default)]
@@ -106,8 +118,8 @@ impl Chain {
 impl Planning {
     /// The fastest profile of a chain from `start`; `None` if none was found that keeps every limit. `hint`: states at the first borders on a way
     /// that is known to keep them, if there is one. Limits are tightened in the chain where the first attempts exceed them between two
-    /// places.
-    pub fn plan(&mut self, chain: &mut Chain, start: Start, hint: &[PathPoint]) -> Option<Profile> {
+    /// places; `look` gives the derivatives on the curve of an interval.
+    pub fn plan(&mut self, chain: &mut Chain, start: Start, hint: &[PathPoint], look: &Look<'_>) -> Option<Profile> {
         let range = chain.control_range(start);
         if range.is_empty() || !self.prepare(chain, start, hint) {
             return None;
@@ -115,10 +127,7 @@ impl Planning {
         let mut time_before = f64::INFINITY;
         let mut attempts = 0;
         for round in 0.. {
-            self.pose(chain, start);
-            self.start_solver(chain, &range);
-            self.fix_start(chain, start);
-            if self.solver.solve(&mut self.problem, GAP_MAX_RATIO) == Outcome::Failed {
+            if !self.solve(chain, start, &range) {
                 return None;
             }
             let profile = self.profile(chain, start);
@@ -129,7 +138,7 @@ impl Planning {
                 self.take_estimate(&profile, &range);
                 continue;
             }
-            if tighten(chain, &profile, &range) {
+            if tighten(chain, &profile, &range, look) {
                 return Some(profile);
             }
             attempts += 1;
@@ -139,6 +148,14 @@ impl Planning {
             self.take_estimate(&profile, &range);
         }
         None
+    }
+
+    pub fn dump(&self, chain: &Chain, start: Start) {
+        let r = Range::of(chain, start);
+        for k in 0..=(r.last - r.first) {
+            let i = &chain.intervals[r.first + k];
+            eprintln!("D {k} s {:.6} h {:.3e} b {:.4e} cap {:.4e} axes {} q2 {:.2e} q3 {:.2e} len {}", i.start_lu, i.length_lu(), self.estimate[k], self.caps[k], i.bounds.axes.len(), i.states[0].second.norm(), i.states[0].third.norm(), i.bounds.jerk_kind.name());
+        }
     }
 
     /// Caps and first estimates; false where a number is none.
@@ -175,11 +192,13 @@ impl Planning {
             self.estimate[0] = point.speed_squared_lu2_s2;
             hinted = hinted.max(1);
         }
+        let mut pace = Pace::default();
         for k in hinted.max(1)..=count {
-            self.estimate[k] = self.estimate[k].min(self.estimate[k - 1] + rise(&intervals[first + k - 1]));
+            self.estimate[k] = pace.next(&intervals[first + k - 1], self.estimate[k - 1], self.estimate[k]);
         }
+        let mut pace = Pace::default();
         for k in (hinted..count).rev() {
-            self.estimate[k] = self.estimate[k].min(self.estimate[k + 1] + rise(&intervals[first + k]));
+            self.estimate[k] = pace.next(&intervals[first + k], self.estimate[k + 1], self.estimate[k]);
         }
         self.estimate.iter().chain(&self.caps).all(|b| *b > 0.0 && !b.is_nan()) && self.estimate.iter().all(|b| b.is_finite())
     }
@@ -232,6 +251,19 @@ impl Planning {
             }
             problem.end_node();
         }
+    }
+
+    /// Solves the problem around the estimate. From a state that uses its limits to the full nothing may be possible but for rounding: the reserve
+    /// gives way a little.
+    fn solve(&mut self, chain: &Chain, start: Start, range: &std::ops::Range<usize>) -> bool {
+        let looser: &[f64] = if start == Start::Rest { &[0.0] } else { &LOOSER_RATIOS };
+        looser.iter().any(|by_ratio| {
+            self.pose(chain, start);
+            self.start_solver(chain, range);
+            self.fix_start(chain, start);
+            self.problem.loosen(*by_ratio);
+            self.solver.solve(&mut self.problem, GAP_MAX_RATIO) == Outcome::Solved
+        })
     }
 
     /// A little below the estimate, with the slopes that it has.
@@ -417,13 +449,37 @@ impl NodeRows<'_> {
     }
 }
 
-/// Greatest change of b over an interval, about.
-fn rise(interval: &Interval) -> f64 {
-    let acceleration = interval.bounds.axes.iter().fold(f64::INFINITY, |least, bound| {
-        let share = interval.states.iter().fold(0.0_f64, |most, state| most.max(state.first[bound.axis].abs()));
-        least.min(bound.acceleration_lu_s2 / share)
-    });
-    2.0 * ESTIMATE_SHARE * acceleration * interval.length_lu()
+/// About the fastest rise of the speed along the path: the bend is left out.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    acceleration: f64,
+}
+
+impl Pace {
+    /// b at the far end of an interval if it is `from` at the near one, at most `cap`.
+    fn next(&mut self, interval: &Interval, from: f64, cap: f64) -> f64 {
+        let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
+        for bound in &interval.bounds.axes {
+            let share = interval.states.iter().fold(0.0_f64, |most, state| most.max(state.first[bound.axis].abs()));
+            acceleration = acceleration.min(bound.acceleration_lu_s2 / share);
+            jerk = jerk.min(bound.jerk_lu_s3.unwrap_or(f64::INFINITY) / share);
+        }
+        let (h, v) = (interval.length_lu(), from.sqrt());
+        let (mut reached, mut faster) = (v, self.acceleration);
+        for _ in 0..PACE_ROUNDS {
+            let time_s = 2.0 * h / (v + reached);
+            faster = (self.acceleration + jerk * time_s).min(acceleration);
+            reached = v + 0.5 * (self.acceleration + faster) * time_s;
+        }
+        let b = reached * reached;
+        if b < cap {
+            self.acceleration = faster;
+            return b;
+        }
+        // Held from here on; where the cap rises the speed may go on rising with it.
+        self.acceleration = (0.5 * (cap - from) / h).clamp(0.0, acceleration);
+        cap
+    }
 }
 
 /// Highest b that the bend allows at constant speed.
@@ -532,23 +588,60 @@ impl Used {
     }
 }
 
+/// How much of its limits an interval uses at most, on the curve itself where it comes near them; NaN where b is not positive.
+fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
+    let interval = &chain.intervals[index];
+    let rough = most_used(interval, profile, chain, index, &interval.eighths(None));
+    if rough < NEAR_RATIO || rough.is_nan() || interval.is_straight() {
+        return rough;
+    }
+    let places = [0.25, 0.75].map(|share| interval.start_lu + share * interval.length_lu());
+    most_used(interval, profile, chain, index, &interval.eighths(Some(places.map(|s_lu| look(index, s_lu)))))
+}
+
+fn most_used(interval: &Interval, profile: &Profile, chain: &Chain, index: usize, states: &[Derivatives; 9]) -> f64 {
+    let places: [(PathPoint, f64); 9] = std::array::from_fn(|i| profile.inside(chain, index, 0.125 * i as f64));
+    if places.iter().any(|(point, _)| !(point.speed_squared_lu2_s2 > 0.0)) {
+        return f64::NAN;
+    }
+    let mut most = 0.0_f64;
+    for bound in &interval.bounds.axes {
+        let axis = bound.axis;
+        let (mut accelerations, mut jerks) = ([0.0; 9], [0.0; 9]);
+        for (i, ((point, bend), state)) in places.iter().zip(states).enumerate() {
+            let (b, slope) = (point.speed_squared_lu2_s2, point.slope_lu_s2);
+            let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
+            accelerations[i] = second * b + 0.5 * first * slope;
+            jerks[i] = (third * b + 1.5 * second * slope + 0.5 * first * bend) * b.sqrt();
+        }
+        most = most.max(summit(&accelerations) / bound.acceleration_lu_s2);
+        if let Some(jerk) = bound.jerk_lu_s3 {
+            most = most.max(summit(&jerks) / jerk);
+        }
+    }
+    most
+}
+
+/// Greatest amount of a function that is known at equal distances: between them by parabolas.
+fn summit(values: &[f64; 9]) -> f64 {
+    let mut most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    for triple in values.windows(3) {
+        let [left, middle, right] = [triple[0], triple[1], triple[2]];
+        let (slope, bend) = (0.5 * (right - left), left - 2.0 * middle + right);
+        // The vertex lies between the outer two, on the same side of 0.
+        if slope.abs() < bend.abs() && bend * middle < 0.0 {
+            most = most.max((middle - 0.5 * slope * slope / bend).abs());
+        }
+    }
+    most
+}
+
 /// True if every limit holds inside every interval too; else the limits of those where it does not are tightened.
-fn tighten(chain: &mut Chain, profile: &Profile, range: &std::ops::Range<usize>) -> bool {
+fn tighten(chain: &mut Chain, profile: &Profile, range: &std::ops::Range<usize>, look: &Look<'_>) -> bool {
     let mut holds = true;
     for index in range.clone() {
-        let mut most = 0.0_f64;
-        let states = chain.intervals[index].five_states();
-        for (place, state) in states.iter().enumerate() {
-            let (point, bend) = profile.inside(chain, index, 0.25 * place as f64);
-            if !(point.speed_squared_lu2_s2 > 0.0) {
-                most = f64::NAN;
-                break;
-            }
-            let used = Used::at(&chain.intervals[index], state, &point, bend);
-            // A start state that was planned with other limits may use a little more than planning would.
-            most = most.max(used.acceleration.0).max(used.jerk.0);
-        }
-        if most <= 1.0 {
+        let most = used_inside(chain, profile, index, look);
+        if most <= HELD_RATIO {
             continue;
         }
         holds = false;

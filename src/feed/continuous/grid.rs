@@ -41,8 +41,8 @@ const REST_SHARE: f64 = 0.15;
 const BESIDE_RATIO: f64 = 1e-9;
 
 /// Share of the limits that planning uses: what lies between the places of a curve may take the rest.
-const LINE_RESERVE_RATIO: f64 = 0.999;
-const CURVE_RESERVE_RATIO: f64 = 0.99;
+const LINE_RESERVE_RATIO: f64 = 0.998;
+const CURVE_RESERVE_RATIO: f64 = 0.988;
 
 /// An axis below this share of the greatest demands of all never comes near its limits.
 const IDLE_SHARE: f64 = 1e-3;
@@ -112,18 +112,30 @@ impl Interval {
         self.end_lu - self.start_lu
     }
 
-    /// At its quarters: between the three places by the parabola through them.
-    pub fn five_states(&self) -> [Derivatives; 5] {
+    /// Derivatives at its eighths, ends included: `looked` at the quarters between the three places or, without, by the parabola through them;
+    /// between those by the cubic through their neighbours.
+    pub fn eighths(&self, looked: Option<[Derivatives; 2]>) -> [Derivatives; 9] {
         let [from, middle, to] = self.states;
-        let quarter = |near: &Derivatives, far: &Derivatives| {
-            let mix = |near: AxisVector, middle: AxisVector, far: AxisVector| near * 0.375 + middle * 0.75 + far * -0.125;
-            Derivatives {
-                first: mix(near.first, middle.first, far.first),
-                second: mix(near.second, middle.second, far.second),
-                third: mix(near.third, middle.third, far.third),
-            }
-        };
-        [from, quarter(&from, &to), middle, quarter(&to, &from), to]
+        let near_end = |near, next, far| Derivatives::mixed([near, next, far, far], [0.375, 0.75, -0.125, 0.0]);
+        let inside = |states| Derivatives::mixed(states, [-0.0625, 0.5625, 0.5625, -0.0625]);
+        let [q1, q3] = looked.unwrap_or_else(|| [near_end(&from, &middle, &to), near_end(&to, &middle, &from)]);
+        [
+            from,
+            near_end(&from, &q1, &middle),
+            q1,
+            inside([&from, &q1, &middle, &q3]),
+            middle,
+            inside([&q1, &middle, &q3, &to]),
+            q3,
+            near_end(&to, &q3, &middle),
+            to,
+        ]
+    }
+
+    /// The derivatives are the same all along.
+    pub fn is_straight(&self) -> bool {
+        let [from, middle, to] = &self.states;
+        from.first == middle.first && middle.first == to.first
     }
 
     /// A part of it.
@@ -138,6 +150,15 @@ impl Interval {
             }
         });
         Self { start_lu, end_lu, states, bounds: self.bounds.clone(), ..*self }
+    }
+}
+
+impl Derivatives {
+    fn mixed(states: [&Self; 4], weights: [f64; 4]) -> Self {
+        let mix = |of: fn(&Self) -> AxisVector| {
+            states.iter().zip(weights).fold(AxisVector::zero(), |sum, (state, weight)| sum + of(state) * weight)
+        };
+        Self { first: mix(|state| state.first), second: mix(|state| state.second), third: mix(|state| state.third) }
     }
 }
 
@@ -324,13 +345,12 @@ impl<'a> Cutter<'a> {
             End::Rest => 0.0,
         };
         let by_acceleration = (from_lu_s * from_lu_s + 2.0 * self.acceleration_lu_s2 * distance_lu).sqrt();
-        if end == End::Rest && self.bounds.jerk_limited {
-            // s = j t³/6, v = j t²/2
-            let by_jerk = 0.5 * self.jerk_lu_s3 * (6.0 * distance_lu / self.jerk_lu_s3).cbrt().powi(2);
-            by_acceleration.min(by_jerk)
-        } else {
-            by_acceleration
+        if !self.bounds.jerk_limited {
+            return by_acceleration;
         }
+        // s = j t³/6, v = j t²/2
+        let by_jerk = from_lu_s + 0.5 * self.jerk_lu_s3 * (6.0 * distance_lu / self.jerk_lu_s3).cbrt().powi(2);
+        by_acceleration.min(by_jerk)
     }
 
     /// The middle is what is between its neighbours.

@@ -82,6 +82,11 @@ impl Problem {
         }
     }
 
+    /// Every limit counts as so much wider.
+    pub fn loosen(&mut self, by_ratio: f64) {
+        self.rows.iter_mut().for_each(|row| row.bound += by_ratio * row.bound.abs().min(1.0));
+    }
+
     /// The limits of the node at hand are complete.
     pub fn end_node(&mut self) {
         self.ends.push(self.rows.len());
@@ -176,6 +181,7 @@ impl Solver {
         self.first_slacks(problem, count);
         let mut stalls = 0;
         let debug = std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "2");
+        if debug { eprintln!("new {} {}", self.nodes.len(), problem.rows.len()); }
         for it in 0..STEPS_MAX {
             let (gap, residual) = self.linearise(problem);
             if debug { eprintln!("  it {it} gap {gap:.3e} res {residual:.3e} b0 {:?}", self.nodes[0].state); }

@@ -16,7 +16,7 @@ use super::limits::AxisRules;
 use super::profile::SpeedCap;
 use super::{Limit, LimitKind, TimeLaw};
 use crate::kinematics::JointPath;
-use chain::{Chain, Junction, Planning, Profile, Start};
+use chain::{Chain, Junction, Look, Planning, Profile, Start};
 use grid::{Derivatives, End, Grid};
 use std::sync::Arc;
 
@@ -100,15 +100,22 @@ impl Continuous {
         let pieces = &pieces[..count];
         let mut chain = Chain::default();
         let mut counts = std::collections::VecDeque::new();
+        let mut firsts = Vec::with_capacity(count);
         let Some(last) = pieces.last() else { return };
         let rests = last.rests_after;
         for (index, piece) in pieces.iter().enumerate() {
             let before = chain.intervals.len();
             add_piece(&mut chain, piece, index == 0 && start == Start::Rest, index + 1 == count);
             counts.push_back(chain.intervals.len() - before);
+            firsts.push(before);
         }
-        let Some(profile) = self.attempt(&mut chain, start) else {
+        let look = |index: usize, s_lu: f64| {
+            let piece = firsts.partition_point(|first| *first <= index).saturating_sub(1);
+            Derivatives::from(pieces[piece].path.at(s_lu))
+        };
+        let Some(profile) = self.attempt(&mut chain, start, &look) else {
             if std::env::var("SOLLWERT_DEBUG").is_ok() { eprintln!("no plan: start {start:?} intervals {} pieces {} refuge {}", chain.intervals.len(), count, self.pieces.is_empty()); }
+            if std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "3") { self.planning.dump(&chain, start); std::process::exit(3); }
             // What was planned before still stands, to its end.
             self.kept = self.chain.intervals.len();
             if self.pieces.is_empty() {
@@ -124,18 +131,39 @@ impl Continuous {
 
     /// A profile for `chain`. What is left of the plan before is a way that keeps every limit; where it does not brake for its own end it is about the
     /// fastest as well.
-    fn attempt(&mut self, chain: &mut Chain, start: Start) -> Option<Profile> {
+    fn attempt(&mut self, chain: &mut Chain, start: Start, look: &Look<'_>) -> Option<Profile> {
         let left = self.first..self.uncut.max(self.first);
         let points = self.profile.points.get(left).unwrap_or(&[]);
         let fast = points.get(..self.braking.saturating_sub(self.first)).unwrap_or(points);
-        let planned = self.planning.plan(chain, start, fast);
+        let planned = self.planning.plan(chain, start, fast, look);
         if planned.is_some() || points.len() <= fast.len() {
             return planned;
         }
-        self.planning.plan(chain, start, points)
+        self.planning.plan(chain, start, points, look)
     }
 
     /// The law of the front piece, which is handed out.
+    pub fn debug_front(&self, law: &TimeLaw, path: &JointPath) {
+        for (n, phase) in law.phases().iter().enumerate() {
+            for i in 0..=16 {
+                let st = phase.at(phase.duration_s * i as f64 / 16.0);
+                let q = path.at(st.position_lu);
+                let (v, a, j) = (st.velocity_lu_s, st.acceleration_lu_s2, st.jerk_lu_s3);
+                let index = self.first - law.phases().len() + n;
+                let interval = &self.chain.intervals[index];
+                for b in &interval.bounds.axes {
+                    let jj = q.third[b.axis] * v * v * v + 3.0 * q.second[b.axis] * v * a + q.first[b.axis] * j;
+                    let r = jj.abs() / b.jerk_lu_s3.unwrap_or(f64::INFINITY);
+                    if r > 1.0005 {
+                        let k = interval.bounds.axes.iter().position(|x| x.axis == b.axis).unwrap();
+                        let _ = k;
+                        eprintln!("VIOL r {r:.5} phase {n}/{} index {index} i {i} s {} of [{} {}] L {} reserve {} v {v} a {a} j {j} q2 {:?} q3 {:?} states {:?}", law.phases().len(), st.position_lu, interval.start_lu, interval.end_lu, path.length_lu(), interval.reserve_ratio, q.second[b.axis], q.third[b.axis], interval.states.map(|s| s.third[b.axis]));
+                    }
+                }
+            }
+        }
+    }
+
     pub fn take_front(&mut self) -> Option<TimeLaw> {
         if let Some(law) = self.refuge.take() {
             return Some(law);
@@ -178,7 +206,7 @@ impl Continuous {
 
 /// Cuts the pieces that a plan reaches into intervals; how many these are.
 fn cut_pieces(pieces: &mut [Piece<'_>], start: Start) -> usize {
-    let (mut beyond_lu, mut stop_lu, mut intervals) = (0.0, 0.0_f64, 0);
+    let (mut beyond_ratio, mut intervals) = (0.0, 0);
     for index in 0..pieces.len() {
         let junction_lu_s = |piece: &Piece<'_>| piece.junction.velocity_lu_s;
         let before = index.checked_sub(1).map(|before| pieces[before].flow.ends_lu_s[1]);
@@ -200,12 +228,12 @@ fn cut_pieces(pieces: &mut [Piece<'_>], start: Start) -> usize {
             piece.flow.grid = Some(Grid::new(&piece.flow.rules, piece.path, piece.flow.blend, [first, last]));
         }
         let Some(grid) = &piece.flow.grid else { continue };
-        stop_lu = stop_lu.max(grid.stop_lu);
         intervals += grid.intervals.len();
         if index > 0 {
-            beyond_lu += length_lu;
+            // Each way in stopping distances of its own speed.
+            beyond_ratio += length_lu / grid.stop_lu;
         }
-        if beyond_lu >= REACH_RATIO * stop_lu && intervals >= REACH_INTERVALS {
+        if beyond_ratio >= REACH_RATIO && intervals >= REACH_INTERVALS {
             return index + 1;
         }
     }
