@@ -149,9 +149,10 @@ impl Planner {
 
     /// A piece whose F is the same all along.
     fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
-        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_)));
+        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_) | Curve::Quintic(_)));
+        let scanned = polynomial || !path.is_contour();
         // A length that is no number is refused as it is.
-        if !polynomial || !path.length_lu().is_finite() {
+        if !scanned || !path.length_lu().is_finite() {
             return self.push_part(Part { path, worst: None });
         }
         if self.continuous.is_some() {
@@ -288,11 +289,7 @@ impl Planner {
             }
             continuous.plan(&mut pieces);
         }
-        let law = continuous.take_front();
-        if std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "4") && let Some(law) = &law && let Some(front) = entries.front() {
-            continuous.debug_front(law, &front.path);
-        }
-        law
+        continuous.take_front()
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.

@@ -150,14 +150,6 @@ impl Planning {
         None
     }
 
-    pub fn dump(&self, chain: &Chain, start: Start) {
-        let r = Range::of(chain, start);
-        for k in 0..=(r.last - r.first) {
-            let i = &chain.intervals[r.first + k];
-            eprintln!("D {k} s {:.6} h {:.3e} b {:.4e} cap {:.4e} axes {} q2 {:.2e} q3 {:.2e} len {}", i.start_lu, i.length_lu(), self.estimate[k], self.caps[k], i.bounds.axes.len(), i.states[0].second.norm(), i.states[0].third.norm(), i.bounds.jerk_kind.name());
-        }
-    }
-
     /// Caps and first estimates; false where a number is none.
     fn prepare(&mut self, chain: &Chain, start: Start, hint: &[PathPoint]) -> bool {
         let Range { first, last } = Range::of(chain, start);
@@ -200,7 +192,8 @@ impl Planning {
         for k in (hinted..count).rev() {
             self.estimate[k] = pace.next(&intervals[first + k], self.estimate[k + 1], self.estimate[k]);
         }
-        self.estimate.iter().chain(&self.caps).all(|b| *b > 0.0 && !b.is_nan()) && self.estimate.iter().all(|b| b.is_finite())
+        self.estimate.iter().chain(&self.caps).all(|b| *b > 0.0 && !b.is_nan())
+            && self.estimate.iter().all(|b| b.is_finite())
     }
 
     fn take_estimate(&mut self, profile: &Profile, range: &std::ops::Range<usize>) {
@@ -289,7 +282,8 @@ impl Planning {
         let state = match start {
             Start::At(point) => scale.scaled(&point),
             Start::Rest => {
-                let ray = [1.0, ray_exponent(&chain.intervals[0]) / chain.intervals[0].length_lu() * scale.b / scale.slope];
+                let ray =
+                    [1.0, ray_exponent(&chain.intervals[0]) / chain.intervals[0].length_lu() * scale.b / scale.slope];
                 self.problem.start_ray_ratio = Some(ray);
                 ray.map(|component| 0.9 * component)
             }
@@ -314,7 +308,9 @@ impl Planning {
         }
         for k in 0..count {
             let (before, after) = (profile.points[first + k], profile.points[first + k + 1]);
-            profile.bends_per_s2.push((after.slope_lu_s2 - before.slope_lu_s2) / chain.intervals[first + k].length_lu());
+            profile
+                .bends_per_s2
+                .push((after.slope_lu_s2 - before.slope_lu_s2) / chain.intervals[first + k].length_lu());
         }
         profile.points.push(rest);
         profile.bends_per_s2.push(0.0);
@@ -529,10 +525,12 @@ impl Profile {
     /// Time of all intervals, about: a measure of progress.
     fn time_s(&self, chain: &Chain) -> f64 {
         let pairs = self.points.windows(2).zip(&chain.intervals);
-        pairs.map(|(pair, interval)| {
-            let sum = pair[0].speed_squared_lu2_s2.max(0.0).sqrt() + pair[1].speed_squared_lu2_s2.max(0.0).sqrt();
-            2.0 * interval.length_lu() / sum
-        }).sum()
+        pairs
+            .map(|(pair, interval)| {
+                let sum = pair[0].speed_squared_lu2_s2.max(0.0).sqrt() + pair[1].speed_squared_lu2_s2.max(0.0).sqrt();
+                2.0 * interval.length_lu() / sum
+            })
+            .sum()
     }
 
     /// What holds the speed in an interval, and how far its limit is used at the middle; of the ends what is used most there.
@@ -576,7 +574,8 @@ impl Used {
             let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
             let acceleration = (second * b + 0.5 * first * slope).abs() / bound.acceleration_lu_s2;
             if acceleration > used.acceleration.0 || acceleration.is_nan() {
-                used.acceleration = (acceleration, Limit { kind: crate::feed::LimitKind::Acceleration, axis: Some(axis) });
+                used.acceleration =
+                    (acceleration, Limit { kind: crate::feed::LimitKind::Acceleration, axis: Some(axis) });
             }
             let Some(limit) = bound.jerk_lu_s3 else { continue };
             let jerk = (third * b + 1.5 * second * slope + 0.5 * first * bend_per_s2).abs() * b.max(0.0).sqrt() / limit;

@@ -7,9 +7,9 @@
 //! constant jerk.
 //! Does not plan the speed; the limits between the places are checked after planning (`check`).
 
+use super::super::LimitKind;
 use super::super::limits::AxisRules;
 use super::super::profile::SpeedCap;
-use super::super::LimitKind;
 use crate::base::{AxisId, AxisVector};
 use crate::geometry::Curve;
 use crate::kinematics::{JointPath, JointState};
@@ -29,6 +29,9 @@ const STEP_MAX_S: f64 = 0.02;
 
 /// Away from the ends of a piece an interval takes at most this share of the time to the nearer end.
 const GROWTH_SHARE: f64 = 0.3;
+
+/// The middle alone says too little about a polynomial.
+const POLYNOMIAL_CUTS: u32 = 1;
 
 /// Cuts of an interval at most, and intervals of a piece beyond which it stays coarse.
 const CUTS_MAX: u32 = 40;
@@ -218,7 +221,8 @@ impl<'a> Cutter<'a> {
         let start = Derivatives::from(path.at(0.0));
         let straight = path.is_straight().then_some(start);
         let jerk_limited = rules.jerk_limited;
-        let jerk_of = |limits: &AxisLimits| if blend { limits.transition_jerk_max_lu_s3 } else { limits.jerk_max_lu_s3 };
+        let jerk_of =
+            |limits: &AxisLimits| if blend { limits.transition_jerk_max_lu_s3 } else { limits.jerk_max_lu_s3 };
         let bound = |(axis, limits): (AxisId, &AxisLimits)| AxisBound {
             axis,
             acceleration_lu_s2: limits.acceleration_max_lu_s2,
@@ -275,7 +279,11 @@ impl<'a> Cutter<'a> {
     /// Length of the interval at a rest.
     fn rest_lu(&self) -> f64 {
         let t = self.step_s;
-        let lu = if self.bounds.jerk_limited { self.jerk_lu_s3 * t.powi(3) / 6.0 } else { self.acceleration_lu_s2 * t * t / 2.0 };
+        let lu = if self.bounds.jerk_limited {
+            self.jerk_lu_s3 * t.powi(3) / 6.0
+        } else {
+            self.acceleration_lu_s2 * t * t / 2.0
+        };
         lu.min(REST_SHARE * self.length_lu)
     }
 
@@ -287,11 +295,16 @@ impl<'a> Cutter<'a> {
             || (self.ends[1] == End::Rest && end_lu == self.length_lu && start_lu > 0.0);
         let mut from = (start_lu, at_start);
         let mut waiting = vec![((end_lu, at_end), 0)];
+        let cuts_min =
+            if matches!(self.path.contour.curve(), Some(Curve::Polynomial(_))) { POLYNOMIAL_CUTS } else { 0 };
         while let Some((to, cuts)) = waiting.pop() {
             let middle_lu = 0.5 * (from.0 + to.0);
             let middle = self.look(middle_lu);
             let enough = cuts >= CUTS_MAX || self.intervals.len() + waiting.len() >= INTERVALS_MAX;
-            if rest || enough || (self.quick(from.0, to.0, &middle) && self.smooth(&from.1, &middle, &to.1)) {
+            if rest
+                || enough
+                || (cuts >= cuts_min && self.quick(from.0, to.0, &middle) && self.smooth(&from.1, &middle, &to.1))
+            {
                 self.push(from, middle, to);
                 from = to;
             } else {

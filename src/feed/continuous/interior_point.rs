@@ -180,11 +180,8 @@ impl Solver {
         let count = problem.rows.len() as f64;
         self.first_slacks(problem, count);
         let mut stalls = 0;
-        let debug = std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "2");
-        if debug { eprintln!("new {} {}", self.nodes.len(), problem.rows.len()); }
-        for it in 0..STEPS_MAX {
+        for _ in 0..STEPS_MAX {
             let (gap, residual) = self.linearise(problem);
-            if debug { eprintln!("  it {it} gap {gap:.3e} res {residual:.3e} b0 {:?}", self.nodes[0].state); }
             if !gap.is_finite() {
                 return Outcome::Failed;
             }
@@ -273,8 +270,10 @@ impl Solver {
             let [a00, a01, a10, a11] = transition.state_ratio;
             let [b0, b1] = transition.control_ratio;
             let h = node.hessian;
-            let pa = [p[0] * a00 + p[1] * a10, p[0] * a01 + p[1] * a11, p[1] * a00 + p[2] * a10, p[1] * a01 + p[2] * a11];
-            let q = [h[0] + a00 * pa[0] + a10 * pa[2], h[1] + a00 * pa[1] + a10 * pa[3], h[2] + a01 * pa[1] + a11 * pa[3]];
+            let pa =
+                [p[0] * a00 + p[1] * a10, p[0] * a01 + p[1] * a11, p[1] * a00 + p[2] * a10, p[1] * a01 + p[2] * a11];
+            let q =
+                [h[0] + a00 * pa[0] + a10 * pa[2], h[1] + a00 * pa[1] + a10 * pa[3], h[2] + a01 * pa[1] + a11 * pa[3]];
             if transition.has_control() {
                 let pb = [p[0] * b0 + p[1] * b1, p[1] * b0 + p[2] * b1];
                 let curvature = h[5] + b0 * pb[0] + b1 * pb[1];
@@ -329,7 +328,8 @@ impl Solver {
                 if i < count { node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward } else { 0.0 };
             for row in &mut rows[first..ends[i]] {
                 row.slack_step = row.residual - row.along(&dx, node.control_step);
-                row.multiplier_step = (centring - row.correction) / row.slack - row.multiplier - row.weight * row.slack_step;
+                row.multiplier_step =
+                    (centring - row.correction) / row.slack - row.multiplier - row.weight * row.slack_step;
             }
             first = ends[i];
             if i < count {

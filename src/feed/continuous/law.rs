@@ -11,7 +11,12 @@ use crate::feed::{Limit, Phase, TimeLaw};
 const SERIES_MAX_RATIO: f64 = 0.02;
 
 /// The law over some intervals of a chain: those of one piece. `limits`: what holds each.
-pub(super) fn law(chain: &Chain, profile: &Profile, range: std::ops::Range<usize>, limits: impl Fn(usize) -> Limit) -> TimeLaw {
+pub(super) fn law(
+    chain: &Chain,
+    profile: &Profile,
+    range: std::ops::Range<usize>,
+    limits: impl Fn(usize) -> Limit,
+) -> TimeLaw {
     TimeLaw::new(range.map(|index| {
         let interval = &chain.intervals[index];
         let points = [profile.points[index], profile.points[index + 1]];
@@ -53,11 +58,23 @@ fn rest_phase(start_lu: f64, length_lu: f64, points: [PathPoint; 2], jerk_limite
     let speed_lu_s = points[0].speed_squared_lu2_s2.max(points[1].speed_squared_lu2_s2).sqrt();
     let starts = points[0].speed_squared_lu2_s2 <= 0.0;
     let velocity_lu_s = if starts { 0.0 } else { speed_lu_s };
-    let phase = Phase { duration_s: 0.0, start_lu, velocity_lu_s, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, rate_per_s2: 0.0, limit };
+    let phase = Phase {
+        duration_s: 0.0,
+        start_lu,
+        velocity_lu_s,
+        acceleration_lu_s2: 0.0,
+        jerk_lu_s3: 0.0,
+        rate_per_s2: 0.0,
+        limit,
+    };
     if !jerk_limited {
         let duration_s = 2.0 * length_lu / speed_lu_s;
         let acceleration_lu_s2 = speed_lu_s / duration_s;
-        return Phase { duration_s, acceleration_lu_s2: if starts { acceleration_lu_s2 } else { -acceleration_lu_s2 }, ..phase };
+        return Phase {
+            duration_s,
+            acceleration_lu_s2: if starts { acceleration_lu_s2 } else { -acceleration_lu_s2 },
+            ..phase
+        };
     }
     // s = j t³/6, v = j t²/2
     let duration_s = 3.0 * length_lu / speed_lu_s;

@@ -114,8 +114,14 @@ impl Continuous {
             Derivatives::from(pieces[piece].path.at(s_lu))
         };
         let Some(profile) = self.attempt(&mut chain, start, &look) else {
-            if std::env::var("SOLLWERT_DEBUG").is_ok() { eprintln!("no plan: start {start:?} intervals {} pieces {} refuge {}", chain.intervals.len(), count, self.pieces.is_empty()); }
-            if std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "3") { self.planning.dump(&chain, start); std::process::exit(3); }
+            if std::env::var("SOLLWERT_DEBUG").is_ok() {
+                eprintln!(
+                    "no plan: start {start:?} intervals {} pieces {} refuge {}",
+                    chain.intervals.len(),
+                    count,
+                    self.pieces.is_empty()
+                );
+            }
             // What was planned before still stands, to its end.
             self.kept = self.chain.intervals.len();
             if self.pieces.is_empty() {
@@ -143,27 +149,6 @@ impl Continuous {
     }
 
     /// The law of the front piece, which is handed out.
-    pub fn debug_front(&self, law: &TimeLaw, path: &JointPath) {
-        for (n, phase) in law.phases().iter().enumerate() {
-            for i in 0..=16 {
-                let st = phase.at(phase.duration_s * i as f64 / 16.0);
-                let q = path.at(st.position_lu);
-                let (v, a, j) = (st.velocity_lu_s, st.acceleration_lu_s2, st.jerk_lu_s3);
-                let index = self.first - law.phases().len() + n;
-                let interval = &self.chain.intervals[index];
-                for b in &interval.bounds.axes {
-                    let jj = q.third[b.axis] * v * v * v + 3.0 * q.second[b.axis] * v * a + q.first[b.axis] * j;
-                    let r = jj.abs() / b.jerk_lu_s3.unwrap_or(f64::INFINITY);
-                    if r > 1.0005 {
-                        let k = interval.bounds.axes.iter().position(|x| x.axis == b.axis).unwrap();
-                        let _ = k;
-                        eprintln!("VIOL r {r:.5} phase {n}/{} index {index} i {i} s {} of [{} {}] L {} reserve {} v {v} a {a} j {j} q2 {:?} q3 {:?} states {:?}", law.phases().len(), st.position_lu, interval.start_lu, interval.end_lu, path.length_lu(), interval.reserve_ratio, q.second[b.axis], q.third[b.axis], interval.states.map(|s| s.third[b.axis]));
-                    }
-                }
-            }
-        }
-    }
-
     pub fn take_front(&mut self) -> Option<TimeLaw> {
         if let Some(law) = self.refuge.take() {
             return Some(law);
@@ -275,4 +260,3 @@ fn add_piece(chain: &mut Chain, piece: &Piece<'_>, starts_at_rest: bool, ends_at
         }
     }
 }
-
