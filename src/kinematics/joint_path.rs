@@ -21,7 +21,7 @@ impl JointPath {
 
     /// True where every axis moves in proportion to s: the derivatives are the same all along.
     pub fn is_straight(&self) -> bool {
-        matches!(self.contour.curve(), Some(Curve::Line(_)))
+        self.is_contour() && matches!(self.contour.curve(), Some(Curve::Line(_)))
     }
 
     /// Posture and derivatives at s, clamped to the ends of the piece.

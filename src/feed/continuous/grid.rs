@@ -258,10 +258,13 @@ impl<'a> Cutter<'a> {
         if rests[0] {
             borders.push(self.rest_lu());
         }
-        if let Some(Curve::Polynomial(curve)) = self.path.contour.curve() {
-            let inside = [borders[borders.len() - 1], self.length_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
-            borders.extend(curve.knots_lu().filter(|s_lu| *s_lu > inside[0] && *s_lu < inside[1]));
-        }
+        let inside = [borders[borders.len() - 1], self.length_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
+        let knots: Vec<f64> = match self.path.contour.curve() {
+            Some(Curve::Polynomial(curve)) if self.path.is_contour() => curve.knots_lu().collect(),
+            _ if self.path.is_contour() => Vec::new(),
+            _ => self.path.nodes_lu(),
+        };
+        borders.extend(knots.into_iter().filter(|s_lu| *s_lu > inside[0] && *s_lu < inside[1]));
         if rests[1] {
             borders.push(self.length_lu - self.rest_lu());
         }
