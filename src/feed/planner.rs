@@ -143,7 +143,8 @@ impl Planner {
 
     /// A piece whose F is the same all along.
     fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
-        let scanned = matches!(path.contour.curve(), Some(Curve::Polynomial(_))) || !path.is_contour();
+        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_) | Curve::Quintic(_)));
+        let scanned = polynomial || !path.is_contour();
         // A length that is no number is refused as it is.
         if !scanned || !path.length_lu().is_finite() {
             return self.push_part(Part { path, worst: None });

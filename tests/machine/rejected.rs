@@ -335,7 +335,6 @@ fn values_of_later_versions_are_refused_by_name() {
         ("\"signed\"", "\"printed\"", "feed.curvature_jump = \"printed\""),
         ("\"worst\"", "\"printed\"", "feed.arc_limits = \"printed\""),
         ("blend_law = \"limits\"", "blend_law = \"published\"", "smoothing.blend_law = \"published\""),
-        ("\"hermite3\"", "\"quintic\"", "smoothing.shape = \"quintic\""),
         ("limits = \"axis\"", "limits = \"path\"", "smoothing.limits = \"path\""),
     ];
     let now = with(EXAMPLE, "time_law = \"continuous\"", "time_law = \"seven-phase\"");
