@@ -9,7 +9,7 @@
 //!
 //! (Lagrange's remainder; A_step is what the acceleration steps by), so that a point can be looked for between set-points.
 
-use crate::run::{Posture, Run, Target, distance};
+use crate::run::{Posture, Run, Target, distance, posture};
 use crate::verdict::{Finding, Kind};
 use sollwert::base::AxisKind;
 use sollwert::interpreter::Compressor;
@@ -39,7 +39,11 @@ pub fn check(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Vec<Findi
 fn finding(kind: Kind, value: f64, allowed: f64, text: String) -> Option<Finding> {
     let ratio = value / allowed;
     // A NaN is a finding.
-    (ratio.is_nan() || ratio > 1.0).then(|| Finding { kind, ratio, text: format!("{text}: {value:.6e}, allowed {allowed:.6e}") })
+    (ratio.is_nan() || ratio > 1.0).then(|| Finding {
+        kind,
+        ratio,
+        text: format!("{text}: {value:.6e}, allowed {allowed:.6e}"),
+    })
 }
 
 fn tolerance(machine: &Machine, target: &Target, next: Option<&Target>) -> Tolerance {
@@ -76,10 +80,7 @@ fn points(machine: &Machine, run: &Run) -> Option<Finding> {
         let first = run.targets[n.saturating_sub(1)].block;
         let last = run.targets.get(n + 2).map_or(u64::MAX, |target| target.block);
         let met = run.stretches.iter().filter(|stretch| (first..=last).contains(&stretch.block)).any(|stretch| {
-            let end = stretch.curve.as_ref().map_or(stretch.at, |curve| {
-                let end = curve.end().0;
-                std::array::from_fn(|i| end.as_slice()[i])
-            });
+            let end = stretch.path.as_ref().map_or(stretch.at, |path| posture(&path.at(f64::INFINITY).position.0));
             distance(&end, &target.end) <= MET_LU || distance(&stretch.at, &target.end) <= MET_LU
         });
         if met {
@@ -99,14 +100,16 @@ fn points(machine: &Machine, run: &Run) -> Option<Finding> {
 /// How near the path comes to a point, over the tolerance.
 fn missed(machine: &Machine, run: &Run, blocks: [u64; 2], (target, tolerance): (&Target, Tolerance)) -> f64 {
     let t = run.t_s;
-    let stepped = if machine.smoothing.shape == BlendShape::Quintic { 0.0 } else { machine.smoothing.radial_acceleration_share };
+    let stepped =
+        if machine.smoothing.shape == BlendShape::Quintic { 0.0 } else { machine.smoothing.radial_acceleration_share };
     let off: Vec<f64> = machine
         .axes
         .iter()
         .map(|axis| {
             let limits = &axis.limits;
             let jerk = limits.jerk_max_lu_s3.max(limits.transition_jerk_max_lu_s3);
-            jerk * t.powi(3) * (1.0 / (9.0 * 3_f64.sqrt()) + 1.0 / 16.0) + stepped * limits.acceleration_max_lu_s2 * t * t / 16.0
+            jerk * t.powi(3) * (1.0 / (9.0 * 3_f64.sqrt()) + 1.0 / 16.0)
+                + stepped * limits.acceleration_max_lu_s2 * t * t / 16.0
         })
         .collect();
     let rows = &run.rows;
@@ -155,7 +158,7 @@ fn feeds(machine: &Machine, run: &Run) -> Option<Finding> {
 }
 
 /// Within a cycle of a rest every axis is no further from it than jerk makes of rest in that time.
-fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Finding> {
+pub fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Finding> {
     for k in 1..run.rows.len() {
         let (from, to) = (places[k - 1].0, places[k].0);
         let rests = (from..to).find(|n| run.joints[*n].rests);
@@ -190,13 +193,26 @@ fn ends(machine: &Machine, run: &Run) -> Vec<Finding> {
     };
     let end = run.targets.last().map_or(home, |target| target.end);
     findings.extend(finding(Kind::Rest, distance(&first.q, &home), 1e-12, "the first set-point is off home".into()));
-    findings.extend(finding(Kind::Rest, distance(&last.q, &end), 1e-12, "the last set-point is off the last point".into()));
+    findings.extend(finding(
+        Kind::Rest,
+        distance(&last.q, &end),
+        1e-12,
+        "the last set-point is off the last point".into(),
+    ));
     if rows.len() > 1 {
         findings.extend(far(machine, run, &rows[1].q, &home, "start, distance of set-point 1"));
-        findings.extend(far(machine, run, &rows[rows.len() - 2].q, &end, "end, distance of the last set-point but one"));
+        findings.extend(far(
+            machine,
+            run,
+            &rows[rows.len() - 2].q,
+            &end,
+            "end, distance of the last set-point but one",
+        ));
     }
     let cycles = (rows.len() - 1) as f64;
-    let off = (run.summary.cycle_time_s - cycles * run.t_s).abs() + (run.summary.setpoints as f64 - cycles).abs();
-    findings.extend(finding(Kind::CycleTime, off, 1e-9, "cycle time and set-points".into()));
+    if let Some(summary) = &run.summary {
+        let off = (summary.cycle_time_s - cycles * run.t_s).abs() + (summary.setpoints as f64 - cycles).abs();
+        findings.extend(finding(Kind::CycleTime, off, 1e-9, "cycle time and set-points".into()));
+    }
     findings
 }

@@ -34,11 +34,22 @@ pub enum Motion {
     Rapid(Way),
     Line(Way),
     /// In X and Y, the centre from the start; all other axes go along by `way`.
-    Arc { centre: [f64; 2], sweep_rad: f64, way: Way },
+    Arc {
+        centre: [f64; 2],
+        sweep_rad: f64,
+        way: Way,
+    },
     /// ASPLINE, BSPLINE, CSPLINE through (or near) points.
-    Spline { word: &'static str, ways: Vec<Way> },
+    Spline {
+        word: &'static str,
+        ways: Vec<Way>,
+    },
     /// POLY: the end, and coefficients of u² and u³.
-    Poly { way: Way, bends: Way, twists: Way },
+    Poly {
+        way: Way,
+        bends: Way,
+        twists: Way,
+    },
 }
 
 /// Digits of the positions of lines.
@@ -66,8 +77,16 @@ impl Program {
     /// About `count` motions.
     pub fn random(random: &mut Random, settings: &Settings, count: usize) -> Self {
         let (restless, mixed) = (random.below(3) == 0, random.below(4) == 0);
-        let mut maker =
-            Maker { random, settings, blocks: Vec::new(), at: [0.0; 3], heading_rad: 1.0, feed: 3000.0, restless, mixed };
+        let mut maker = Maker {
+            random,
+            settings,
+            blocks: Vec::new(),
+            at: [0.0; 3],
+            heading_rad: 1.0,
+            feed: 3000.0,
+            restless,
+            mixed,
+        };
         maker.mode();
         if maker.random.below(3) == 0 {
             maker.compressor();
@@ -128,7 +147,8 @@ impl Program {
     pub fn smaller(&self) -> impl Iterator<Item = Self> {
         let count = self.blocks.len();
         let sizes = std::iter::successors(Some(count / 2), |size| Some(size / 2)).take_while(|size| *size > 0);
-        let without = sizes.flat_map(move |size| (0..count).step_by(size).map(move |from| (from, (from + size).min(count))));
+        let without =
+            sizes.flat_map(move |size| (0..count).step_by(size).map(move |from| (from, (from + size).min(count))));
         let dropped = without.map(|(from, to)| {
             let kept = self.blocks[..from].iter().chain(&self.blocks[to..]);
             Self { blocks: kept.cloned().collect() }
@@ -174,10 +194,10 @@ struct Printer<'a> {
 }
 
 impl Printer<'_> {
-    /// Words of the axes that have a way, the first one always; moves there.
+    /// Words of the axes that have a way, that of the first axis if none has; moves there.
     fn go(&mut self, way: &Way, digits: usize) {
         for (i, axis) in self.settings.axes.iter().enumerate() {
-            if way[i] != 0.0 || i == 0 {
+            if way[i] != 0.0 || (i == 0 && way.iter().all(|x| *x == 0.0)) {
                 let word = format!("{:.digits$}", self.at[i] + way[i]);
                 self.at[i] = word.parse().unwrap();
                 let _ = write!(self.text, " {}{word}", axis.name);

@@ -6,8 +6,10 @@
 
 use sollwert::base::PerAxis;
 use sollwert::geometry::Curve;
+use sollwert::interpolator::Setpoint;
 use sollwert::interpreter::{Feed, Interpreter, Modes, MoveKind};
 use sollwert::kernel::{Kernel, RunSummary, Status};
+use sollwert::kinematics::{JointPath, Kinematics};
 use sollwert::machine::Machine;
 use sollwert::program::ProgramSource;
 use sollwert::smoothing::{ContourPiece, PieceKind, Smoother};
@@ -42,7 +44,7 @@ pub struct Target {
 pub struct Stretch {
     pub block: u64,
     /// `None`: stands still at `at`.
-    pub curve: Option<Curve>,
+    pub path: Option<JointPath>,
     pub at: Posture,
     pub start_mm: f64,
     pub length_lu: f64,
@@ -64,22 +66,38 @@ pub struct Joint {
 }
 
 /// Everything that is judged.
+#[derive(Clone)]
 pub struct Run {
     pub rows: Vec<Row>,
     pub targets: Vec<Target>,
     pub stretches: Vec<Stretch>,
     /// Joint n is between stretch n and n + 1.
     pub joints: Vec<Joint>,
-    pub summary: RunSummary,
+    /// `None`: not by the kernel.
+    pub summary: Option<RunSummary>,
     pub t_s: f64,
 }
 
-fn posture(values: &PerAxis<f64>) -> Posture {
+pub fn posture(values: &PerAxis<f64>) -> Posture {
     std::array::from_fn(|i| values.as_slice()[i])
 }
 
 fn source(text: &str) -> ProgramSource {
     ProgramSource::from_bytes("proof.mpf", text.as_bytes())
+}
+
+impl Row {
+    pub fn new(setpoint: &Setpoint) -> Self {
+        let path = &setpoint.path;
+        Self {
+            q: posture(&setpoint.axes.map(|axis| axis.position_lu)),
+            block: path.block.number,
+            line: path.block.line,
+            s_mm: path.path_length_mm,
+            feed: path.feed_lu_s,
+            limit: format!("{:?} {:?}", path.limit.kind, path.limit.axis.map(|axis| axis.index())),
+        }
+    }
 }
 
 impl Run {
@@ -89,24 +107,23 @@ impl Run {
         let mut rows = Vec::new();
         while kernel.cycle().map_err(|error| format!("{error:?}"))? == Status::Running {
             let Some(setpoint) = &kernel.output().setpoint else { return Err("a cycle without set-point".into()) };
-            let path = &setpoint.path;
-            rows.push(Row {
-                q: posture(&setpoint.axes.map(|axis| axis.position_lu)),
-                block: path.block.number,
-                line: path.block.line,
-                s_mm: path.path_length_mm,
-                feed: path.feed_lu_s,
-                limit: format!("{:?} {:?}", path.limit.kind, path.limit.axis.map(|axis| axis.index())),
-            });
+            rows.push(Row::new(setpoint));
         }
         if let Some(alarm) = kernel.take_findings().alarm {
             return Err(alarm.render(false));
         }
         let summary = RunSummary::new(machine, "proof.mpf", kernel.figures(), false);
         let (targets, pieces) = prepared(machine, text)?;
-        let (stretches, joints) = path(&pieces);
+        let kinematics = Kinematics::new(machine);
+        let paths: Vec<JointPath> = pieces.into_iter().map(|piece| kinematics.to_joint(piece)).collect();
+        let (stretches, joints) = path(&paths);
         let t_s = machine.cycle.time_base.setpoint_period_s();
-        Ok(Self { rows, targets, stretches, joints, summary, t_s })
+        Ok(Self { rows, targets, stretches, joints, summary: Some(summary), t_s })
+    }
+
+    /// N t_s.
+    pub fn cycle_time_s(&self) -> f64 {
+        (self.rows.len() - 1) as f64 * self.t_s
     }
 
     /// Length of the path and number of its stretches: equal for programs whose paths are the same curve.
@@ -120,7 +137,7 @@ impl Run {
 }
 
 /// Programmed motions, and the pieces of the contour.
-fn prepared(machine: &Machine, text: &str) -> Result<(Vec<Target>, Vec<ContourPiece>), String> {
+pub fn prepared(machine: &Machine, text: &str) -> Result<(Vec<Target>, Vec<ContourPiece>), String> {
     let mut interpreter = Interpreter::new(source(text), machine);
     let mut smoother = Smoother::new(machine);
     let (mut targets, mut pieces): (Vec<Target>, Vec<ContourPiece>) = (Vec::new(), Vec::new());
@@ -136,7 +153,11 @@ fn prepared(machine: &Machine, text: &str) -> Result<(Vec<Target>, Vec<ContourPi
                 | MoveKind::Polynomial(_)
         );
         let end = posture(&next.end.0);
-        let stands = end == at && !matches!(next.kind, MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_));
+        let stands = end == at
+            && !matches!(
+                next.kind,
+                MoveKind::Arc(_) | MoveKind::SpatialArc(_) | MoveKind::Spline(_) | MoveKind::Polynomial(_)
+            );
         at = end;
         // A block without displacement says nothing: its point is that of the block before, with the mode of that one.
         if moves && !stands {
@@ -154,18 +175,19 @@ fn prepared(machine: &Machine, text: &str) -> Result<(Vec<Target>, Vec<ContourPi
 }
 
 /// Stretches, cut where a spline itself steps, and the joints between them.
-fn path(pieces: &[ContourPiece]) -> (Vec<Stretch>, Vec<Joint>) {
+pub fn path(paths: &[JointPath]) -> (Vec<Stretch>, Vec<Joint>) {
     let mut stretches: Vec<Stretch> = Vec::new();
     let mut rests_after: Vec<bool> = Vec::new();
     let mut s_mm = 0.0;
-    for piece in pieces {
+    for path in paths {
+        let piece = &path.contour;
         let blend = matches!(piece.kind, PieceKind::Blend(..));
         let block = piece.block.number;
         let curves = match &piece.kind {
             PieceKind::Block(curve) | PieceKind::Blend(curve, _) => smooth_parts(curve),
-            PieceKind::Wait { at, .. } | PieceKind::WaitPositioned { at, .. } => {
-                let at = posture(&at.0);
-                let wait = Stretch { block, curve: None, at, start_mm: s_mm, length_lu: 0.0, rotary_only: false, blend };
+            PieceKind::Wait { .. } | PieceKind::WaitPositioned { .. } => {
+                let at = posture(&path.at(0.0).position.0);
+                let wait = Stretch { block, path: None, at, start_mm: s_mm, length_lu: 0.0, rotary_only: false, blend };
                 stretches.push(wait);
                 rests_after.push(true);
                 continue;
@@ -173,8 +195,11 @@ fn path(pieces: &[ContourPiece]) -> (Vec<Stretch>, Vec<Joint>) {
         };
         let last = curves.len() - 1;
         for (n, curve) in curves.into_iter().enumerate() {
-            let (length_lu, rotary_only, at) = (curve.length_lu(), curve.rotary_only(), posture(&curve.start().0));
-            stretches.push(Stretch { block, curve: Some(curve), at, start_mm: s_mm, length_lu, rotary_only, blend });
+            let (length_lu, rotary_only) = (curve.length_lu(), curve.rotary_only());
+            let contour = ContourPiece { kind: PieceKind::Block(curve), ..piece.clone() };
+            let part = JointPath { contour, ..path.clone() };
+            let at = posture(&part.at(0.0).position.0);
+            stretches.push(Stretch { block, path: Some(part), at, start_mm: s_mm, length_lu, rotary_only, blend });
             rests_after.push(n == last && piece.stop_at_end);
             if !rotary_only {
                 s_mm += length_lu;
@@ -203,12 +228,12 @@ fn joints(stretches: &[Stretch], rests_after: &[bool]) -> Vec<Joint> {
             rests |= rests_after[n - 1];
             joints[n - 1].rests = rests;
         }
-        let Some(curve) = stretch.curve.as_ref().filter(|_| stretch.length_lu > 0.0) else { continue };
-        if let Some((index, last)) = before.and_then(|index| Some((index, stretches[index].curve.as_ref()?)))
+        let Some(path) = stretch.path.as_ref().filter(|_| stretch.length_lu > 0.0) else { continue };
+        if let Some((index, last)) = before.and_then(|index| Some((index, stretches[index].path.as_ref()?)))
             && !rests
             && n > 0
         {
-            let (end, start) = (last.at(f64::INFINITY), curve.at(0.0));
+            let (end, start) = (last.at(f64::INFINITY), path.at(0.0));
             joints[n - 1] = Joint {
                 turn: posture(&(start.first - end.first)),
                 bend: posture(&(start.second - end.second)),
@@ -254,23 +279,26 @@ const ON_PATH_LU: f64 = 2e-8;
 impl Stretch {
     /// Place of a row, and how far it is from there (infinite where its path length is another).
     fn nearest(&self, row: &Row) -> (f64, f64) {
-        let Some(curve) = &self.curve else { return (0.0, distance(&self.at, &row.q)) };
-        let s_lu = if self.rotary_only { self.foot(curve, &row.q) } else { row.s_mm - self.start_mm };
+        let Some(path) = &self.path else { return (0.0, distance(&self.at, &row.q)) };
+        let s_lu = if self.rotary_only { self.foot(path, &row.q) } else { row.s_mm - self.start_mm };
         if s_lu < -BORDER_LU || s_lu > self.length_lu + BORDER_LU {
             return (s_lu, f64::INFINITY);
         }
         let s_lu = s_lu.clamp(0.0, self.length_lu);
-        (s_lu, distance(&posture(&curve.at(s_lu).position.0), &row.q))
+        (s_lu, distance(&posture(&path.at(s_lu).position.0), &row.q))
     }
 
-    /// Place whose tangent is square to the way to `q`: rows say nothing about the path length of rotary axes. The curve has unit speed,
-    /// so that what is left along the tangent is what is left of the way.
-    fn foot(&self, curve: &Curve, q: &Posture) -> f64 {
+    /// Place whose tangent is square to the way to `q`, over the rotary axes: rows say nothing about their path length. They have unit
+    /// speed, so that what is left along the tangent is what is left of the way.
+    fn foot(&self, path: &JointPath, q: &Posture) -> f64 {
+        let Some(curve) = path.contour.curve() else { return 0.0 };
         let mut s_lu = 0.0;
         for _ in 0..50 {
             let state = curve.at(s_lu);
             let (position, first) = (posture(&state.position.0), posture(&state.first));
-            let left: f64 = (0..5).map(|i| (q[i] - position[i]) * first[i]).sum();
+            // What does not count as path does not move, but for rounding; through a transformation it is elsewhere.
+            let counts = |i: &usize| first[*i].abs() > 1e-9;
+            let left: f64 = (0..5).filter(counts).map(|i| (q[i] - position[i]) * first[i]).sum();
             s_lu = (s_lu + left / first.iter().map(|x| x * x).sum::<f64>()).clamp(-1.0, self.length_lu + 1.0);
             if left.abs() < 1e-13 {
                 break;

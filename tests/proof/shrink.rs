@@ -1,28 +1,18 @@
 //! The smallest program that still fails.
 
-use crate::judged;
 use crate::program::Program;
-use crate::random::Random;
 use crate::settings::Settings;
-use crate::times;
-use crate::verdict::{Finding, Kind};
+use crate::verdict::Finding;
 
 /// Runs that the search may take.
 const RUNS_MAX: usize = 600;
 
-/// The finding of a kind, if a program has it.
-fn failing(settings: &Settings, program: &Program, kind: Kind, random: &Random) -> Option<Finding> {
-    if kind == Kind::Split {
-        // Which block is split depends on how many there are: any will do.
-        let mut random = random.clone();
-        return (0..4).find_map(|_| times::split(settings, program, &mut random));
-    }
-    judged(settings, program, None).into_iter().find(|finding| finding.kind == kind)
-}
+/// Whether a program fails in the way that is looked for.
+type Failing<'a> = &'a dyn Fn(&Program) -> Option<Finding>;
 
 /// Drops blocks while the program still fails in the same way.
-fn smallest(settings: &Settings, program: &Program, kind: Kind, random: &Random) -> Option<(Program, Finding)> {
-    let mut best = (program.clone(), failing(settings, program, kind, random)?);
+fn smallest(program: &Program, failing: Failing<'_>) -> Option<(Program, Finding)> {
+    let mut best = (program.clone(), failing(program)?);
     let mut runs = 0;
     'again: loop {
         for smaller in best.0.clone().smaller() {
@@ -30,7 +20,7 @@ fn smallest(settings: &Settings, program: &Program, kind: Kind, random: &Random)
             if runs > RUNS_MAX {
                 return Some(best);
             }
-            if let Some(finding) = failing(settings, &smaller, kind, random) {
+            if let Some(finding) = failing(&smaller) {
                 best = (smaller, finding);
                 continue 'again;
             }
@@ -40,11 +30,12 @@ fn smallest(settings: &Settings, program: &Program, kind: Kind, random: &Random)
 }
 
 /// Prints the smallest program of a seed with its machine.
-pub fn print(seed: u64, kind: Kind, settings: &Settings, program: &Program, random: &Random) {
-    let Some((program, finding)) = smallest(settings, program, kind, random) else {
-        println!("seed {seed}: {kind:?} is gone when it is run again: not deterministic");
+pub fn print(seed: u64, settings: &Settings, program: &Program, failing: Failing<'_>) {
+    let Some((program, finding)) = smallest(program, failing) else {
+        println!("seed {seed}: the finding is gone when it is run again: not deterministic");
         return;
     };
-    println!("\nseed {seed}, {kind:?}, {:.4} times what is allowed: {}", finding.ratio, finding.text);
+    let Finding { kind, ratio, text } = finding;
+    println!("\nseed {seed}, {kind:?}, {ratio:.4} times what is allowed: {text}");
     println!("{}---\n{}---", program.text(settings), settings.text());
 }
