@@ -347,7 +347,7 @@ fn values_of_later_versions_are_refused_by_name() {
         assert!(refused[0].help.is_some());
     }
     for mode in ["G60", "G64", "G641", "G642"] {
-        let machine = parse(&with(&now, "\"G642\"", &format!("\"{mode}\""))).expect(mode).machine;
+        let machine = parse(&with(EXAMPLE, "\"G642\"", &format!("\"{mode}\""))).expect(mode).machine;
         assert_eq!(machine::unsupported(&machine), [], "{mode}");
     }
 }
