@@ -428,7 +428,8 @@ impl NodeRows<'_> {
         for bound in &interval.bounds.axes {
             let Some(jerk) = bound.jerk_lu_s3 else { continue };
             let axis = bound.axis;
-            for (place, estimate) in [(0, estimates[0]), (2, estimates[1])] {
+            let middle = 0.5 * (estimates[0] + estimates[1]);
+            for (place, estimate) in [(0, estimates[0]), (1, middle), (2, estimates[1])] {
                 let state = &interval.states[place];
                 let limit = interval.reserve_ratio * jerk / estimate.sqrt();
                 let (b, slope, bend) =
@@ -436,14 +437,11 @@ impl NodeRows<'_> {
                 if b == 0.0 && slope == 0.0 && bend == 0.0 {
                     continue;
                 }
+                let x = 0.5 * place as f64 * h;
                 let tangent = 0.5 / estimate;
                 for sign in [1.0, -1.0] {
                     let (b, slope, bend) = (sign * b + tangent, sign * slope, sign * bend);
-                    if place == 0 {
-                        self.push([b, slope, bend], 1.5);
-                    } else {
-                        self.push([b, b * h + slope, 0.5 * b * h * h + slope * h + bend], 1.5);
-                    }
+                    self.push([b, b * x + slope, 0.5 * b * x * x + slope * x + bend], 1.5);
                 }
             }
         }

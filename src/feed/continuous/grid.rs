@@ -17,7 +17,7 @@ use crate::machine::AxisLimits;
 use std::sync::Arc;
 
 /// What the mean of the ends of an interval may miss of its middle, of the greatest demand.
-const MISSED_RATIO: f64 = 0.05;
+const MISSED_RATIO: f64 = 0.07;
 
 /// A demand that would hold the speed to this many times the one that is held for other reasons does not bind.
 const UNBOUND_RATIO: f64 = 1.2;
@@ -51,7 +51,7 @@ const BESIDE_RATIO: f64 = 1e-9;
 
 /// Share of the limits that planning uses: what lies between the places of a curve may take the rest.
 const LINE_RESERVE_RATIO: f64 = 0.998;
-const CURVE_RESERVE_RATIO: f64 = 0.988;
+const CURVE_RESERVE_RATIO: f64 = 0.992;
 
 /// An axis below this share of the greatest demands of all never comes near its limits.
 const IDLE_SHARE: f64 = 1e-3;
