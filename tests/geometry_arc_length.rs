@@ -126,7 +126,10 @@ fn polynomials_are_measured_to_1e_9_and_say_how_well() {
         let curve = PolynomialCurve::new(PartPoint(start), PartPoint(end), &geometry, &linear());
         let length = curve.length_lu();
         assert!(length > 0.0, "{what}: no length");
-        assert!(curve.length_error_max_lu() < 1e-9 * length, "{what}: {:e}", curve.length_error_max_lu() / length);
+        // Far from the origin a quotient is known to its rounding only.
+        let noise = 1e-13 * start.norm();
+        let bound = curve.length_error_max_lu();
+        assert!(bound < 1e-9 * length + noise, "{what}: {:e}", bound / length);
         let mut measured = 0.0;
         for one in &pieces {
             let speed = |u: f64| value(one, u)[1].masked(&linear()).norm();

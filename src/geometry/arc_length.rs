@@ -4,9 +4,10 @@
 //!
 //! A panel is cut in two until eight Gauss-Legendre nodes on the whole and on its halves agree to [`PANEL_ERROR_RATIO`] of its length,
 //! or to [`FLOOR_RATIO`] of that of the curve where the speed |dq/du| has a zero. The halves are what is kept. For a smooth integrand
-//! their error is the difference over 2^16, and where the speed has a zero it is a quarter of it, so that the sum of the differences,
-//! which is kept ([`ArcLengthTable::error_max_lu`]), bounds the error of the length: below 1e-9 of it, and tests compare with another
-//! quadrature. The inverse is Newton's method inside the panel, held by a bracket.
+//! their error is the difference over 2^16. Near a zero of the speed the differences fall slowly from one halving to the next, but they
+//! do not rise, and a parameter has not more than [`HALVINGS`]: so many times the sum of the differences bounds the error of the
+//! length ([`ArcLengthTable::error_max_lu`]), below 1e-9 of it. Tests compare with another quadrature. The inverse is Newton's method
+//! inside the panel, held by a bracket.
 //!
 //! Where the speed is 0 the curve has no direction: such a cusp is the border of two panels, and derivatives near it are taken a
 //! little beside it ([`Panel::safe_ratio`]), so that they are numbers. Positions are exact everywhere.
@@ -15,16 +16,22 @@
 
 use super::curve::DISPLACEMENT_MIN_LU;
 use super::quadrature::integral;
-use super::rational::{derivatives, speed};
+use super::rational::{derivatives, is_plain, speed};
 use crate::base::PerAxis;
 use crate::interpreter::{PolynomialGeometry, PolynomialPiece};
 use std::sync::Arc;
 
 /// Agreement of a panel with its halves, as share of its length.
-const PANEL_ERROR_RATIO: f64 = 5e-11;
+const PANEL_ERROR_RATIO: f64 = 1e-11;
 
 /// The same as share of the length of the curve: enough for a panel whatever its length.
 const FLOOR_RATIO: f64 = 1e-13;
+
+/// A quotient knows the speed to the rounding of its coordinates only: differences below this share of them are noise.
+const NOISE_RATIO: f64 = 2.0 * f64::EPSILON;
+
+/// So often an interval can be halved before its ends are neighbours in f64.
+const HALVINGS: f64 = 52.0;
 
 /// Panels of one piece: more means a curve that no control would drive, such as one with poles.
 const PANELS_MAX: usize = 1024;
@@ -220,7 +227,8 @@ impl ArcLengthTable {
             // Shorter than any motion. Where other axes move meanwhile, they would jump.
             return self.stands(piece).then(Vec::new);
         }
-        let floor_lu = FLOOR_RATIO * total_lu;
+        let noise_lu = if is_plain(piece) { 0.0 } else { NOISE_RATIO * piece.numerator_lu[0].norm() };
+        let floor_lu = noise_lu.max(FLOOR_RATIO * total_lu);
         let mean = rough_lu / end;
         let mut panels = self.cut(index, [0.0, end], floor_lu)?;
         let cusps = self.cusps(piece, &panels, mean);
@@ -271,7 +279,7 @@ impl ArcLengthTable {
                     piece: index,
                     ends_ratio,
                     lengths_lu,
-                    error_lu: 0.5 * error_lu,
+                    error_lu: 0.5 * HALVINGS * error_lu,
                     speeds_lu,
                     safe_ratio: range,
                 });
