@@ -304,7 +304,7 @@ fn a_motion_without_a_speed_is_an_alarm_and_nothing_jumps_over_it() {
 fn limits_of_one_name_add_up() {
     let machine = machine("spinner_mvc850", &[]).machine;
     let (x, y) = (machine.axis_by_name("X"), machine.axis_by_name("Y"));
-    let mut figures = Figures::new(&machine);
+    let mut figures = Figures::default();
     figures.setpoints = 10;
     figures.limits = vec![
         (Limit { kind: LimitKind::Corner, axis: x }, 3),

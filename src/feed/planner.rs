@@ -14,13 +14,15 @@ use super::limits::{AxisRules, Ends, PieceLimits};
 use super::modes::ModeRules;
 use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
+use super::published::{self, Tally};
 use super::split::{self, Part};
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
 use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
-use crate::machine::Machine;
+use crate::machine::{BlendLaw, Machine};
+use crate::program::BlockRef;
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -55,6 +57,10 @@ pub struct Planner {
     cutting_s: f64,
     /// Axes that move on their own.
     arrivals: Arrivals,
+    /// What the printed blend law did.
+    published: Tally,
+    /// What stopped it, if it did.
+    stalled: Option<BlockRef>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
 }
@@ -121,6 +127,8 @@ impl Planner {
             elapsed_s: 0.0,
             cutting_s: 0.0,
             arrivals: Arrivals::new(),
+            published: Tally::default(),
+            stalled: None,
             half_blend_lu: 0.0,
         }
     }
@@ -128,6 +136,17 @@ impl Planner {
     /// Time of everything that has been handed out, and of the motions with feed among it.
     pub fn elapsed_s(&self) -> (f64, f64) {
         (self.elapsed_s, self.cutting_s)
+    }
+
+    /// The alarm of the piece handed out last, with its block: the path comes to rest at the end of what was pushed, after
+    /// [`Planner::finish`].
+    pub fn take_alarm(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        self.stalled.take().map(|block| (block, published::stalled(block)))
+    }
+
+    /// What a person should know about the laws handed out so far, with the block where it began; each once.
+    pub fn take_warning(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        std::mem::take(&mut self.published).warning()
     }
 
     /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken (of a
@@ -219,7 +238,10 @@ impl Planner {
                 let (time_s, limit) = self.arrivals.wait(machine, axes, self.elapsed_s);
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
-            _ => front.fixed(self.entry, ahead, self.setpoint_period_s),
+            _ => match self.printed_law(&front, ahead) {
+                Some(printed) => printed,
+                None => front.fixed(self.entry, ahead, self.setpoint_period_s),
+            },
         };
         self.elapsed_s += law.duration_s();
         if matches!(front.motion, Motion::Moves { .. }) && front.path.contour.feed != Feed::Rapid {
@@ -237,6 +259,35 @@ impl Planner {
             self.rests -= usize::from(next.rests_before());
         }
         Some(piece)
+    }
+
+    /// The printed law of a blend, where the machine asks for it and it leaves with a speed that the path ahead allows.
+    fn printed_law(&mut self, front: &Entry, ahead: SpeedCap) -> Option<(TimeLaw, SpeedCap)> {
+        let contour = &front.path.contour;
+        let (PieceKind::Blend(Curve::Blend(blend), _), true) = (&contour.kind, front.path.is_contour()) else {
+            return None;
+        };
+        let rules = self.rules.of(&contour.modes);
+        if rules.blend_law != BlendLaw::Published || !rules.jerk_limited {
+            return None;
+        }
+        let curve = contour.curve()?;
+        let ahead = if front.rests_after { STOP } else { ahead };
+        match published::crossing(&rules, blend, rules.feed_cap(&contour.feed, curve), self.entry.velocity_lu_s) {
+            Ok(crossing) if crossing.exit_lu_s <= ahead.velocity_lu_s => {
+                self.published.crossed(contour.block, &crossing);
+                let exit = SpeedCap { velocity_lu_s: crossing.exit_lu_s, limit: crossing.limit };
+                Some((crossing.law, exit))
+            }
+            Ok(_) => {
+                self.published.guarded(contour.block);
+                None
+            }
+            Err(published::Stalled) => {
+                self.stalled.get_or_insert(contour.block);
+                None
+            }
+        }
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.
@@ -331,7 +382,7 @@ impl Planner {
             return REST;
         }
         let t_s = self.setpoint_period_s;
-        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
+        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.exit_cap(t_s));
         let inside = piece.motion.highest_entry(if piece.rests_after { REST } else { exit });
         if inside.cap.velocity_lu_s < junction.velocity_lu_s {
             return inside;
@@ -381,6 +432,14 @@ impl Motion {
             Self::Moves { limits, .. } => limits.cap,
             Self::Waits { .. } | Self::WaitsFor { .. } => STOP,
             Self::Nothing => FREE,
+        }
+    }
+
+    /// Highest speed at its end.
+    fn exit_cap(&self, setpoint_period_s: f64) -> SpeedCap {
+        match self {
+            Self::Moves { limits, block_length_lu: None, .. } => limits.exit_cap,
+            _ => self.cap(setpoint_period_s),
         }
     }
 
