@@ -235,7 +235,7 @@ impl AxisRules {
             Curve::Arc(arc) => self.arc(&Worst::on_arc(arc), &ends.start, feed, jerk_limited),
             Curve::SpatialArc(arc) => self.arc(&Worst::on_spatial_arc(arc), &ends.start, feed, jerk_limited),
             // Unknown demands allow nothing: the planner refuses the piece.
-            Curve::Polynomial(_) => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
+            Curve::Polynomial(_) | Curve::Quintic(_) => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
             Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
         }
     }

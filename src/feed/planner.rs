@@ -59,8 +59,8 @@ pub struct Planner {
     arrivals: Arrivals,
     /// What the printed blend law did.
     published: Tally,
-    /// What stopped it, if it did.
-    stalled: Option<BlockRef>,
+    /// Where it came to a stand first, and whether that has been told.
+    stalled: Option<(BlockRef, bool)>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
 }
@@ -141,7 +141,8 @@ impl Planner {
     /// The alarm of the piece handed out last, with its block: the path comes to rest at the end of what was pushed, after
     /// [`Planner::finish`].
     pub fn take_alarm(&mut self) -> Option<(BlockRef, Diagnostic)> {
-        self.stalled.take().map(|block| (block, published::stalled(block)))
+        let (block, told) = self.stalled.as_mut()?;
+        (!std::mem::replace(told, true)).then(|| (*block, published::stalled(*block)))
     }
 
     /// What a person should know about the laws handed out so far, with the block where it began; each once.
@@ -162,7 +163,8 @@ impl Planner {
 
     /// A piece whose F is the same all along.
     fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
-        let scanned = matches!(path.contour.curve(), Some(Curve::Polynomial(_))) || !path.is_contour();
+        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_) | Curve::Quintic(_)));
+        let scanned = polynomial || !path.is_contour();
         // A length that is no number is refused as it is.
         if !scanned || !path.length_lu().is_finite() {
             return self.push_part(Part { path, worst: None });
@@ -268,23 +270,23 @@ impl Planner {
             return None;
         };
         let rules = self.rules.of(&contour.modes);
-        if rules.blend_law != BlendLaw::Published || !rules.jerk_limited {
+        if rules.blend_law != BlendLaw::Published || !rules.jerk_limited || self.stalled.is_some() {
             return None;
         }
         let curve = contour.curve()?;
         let ahead = if front.rests_after { STOP } else { ahead };
         match published::crossing(&rules, blend, rules.feed_cap(&contour.feed, curve), self.entry.velocity_lu_s) {
-            Ok(crossing) if crossing.exit_lu_s <= ahead.velocity_lu_s => {
+            Ok(crossing) if crossing.exit_lu_s <= ahead.velocity_lu_s * published::RULE_RATIO => {
                 self.published.crossed(contour.block, &crossing);
                 let exit = SpeedCap { velocity_lu_s: crossing.exit_lu_s, limit: crossing.limit };
-                Some((crossing.law, exit))
+                Some((crossing.law, exit.min(ahead)))
             }
             Ok(_) => {
                 self.published.guarded(contour.block);
                 None
             }
             Err(published::Stalled) => {
-                self.stalled.get_or_insert(contour.block);
+                self.stalled = Some((contour.block, false));
                 None
             }
         }

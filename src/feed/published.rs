@@ -14,7 +14,8 @@
 //! acceleration steps there.
 //!
 //! A step of constant u''' is no polynomial in s. Its phase here is the cubic s(t) with the exact position and speed at both ends of the
-//! step; between them it is off by `t_s⁴ |d⁴s/dt⁴| / 384` at most (nanometres at 1 ms), and its acceleration by `t_s² |d⁴s/dt⁴| / 12`.
+//! step; between them it is off by `t_s⁴ |d⁴s/dt⁴| / 384` at most (below a nanometre at 1 ms), and its acceleration by
+//! `t_s² |d⁴s/dt⁴| / 12`.
 
 use super::limits::{AxisRules, FeedCap};
 use super::{Limit, LimitKind, Phase, TimeLaw};
@@ -27,7 +28,7 @@ use crate::program::BlockRef;
 const STEPS_MAX: usize = 100_000;
 
 /// A rule holds up to rounding: the entry feed meets one of them exactly.
-const RULE_RATIO: f64 = 1.0 + 1e-9;
+pub(super) const RULE_RATIO: f64 = 1.0 + 1e-9;
 
 /// A shorter part of a step has no acceleration that differences of its ends could show.
 const SHORT_STEP_RATIO: f64 = 1e-3;
@@ -115,8 +116,7 @@ pub(super) fn crossing(
             state.time_of_end(third_per_s3, period_s)
         };
         let next = state.after(third_per_s3, duration_s);
-        // Also ends on NaN.
-        if !(next.first_per_s > 0.0) {
+        if next.first_per_s <= 0.0 || next.first_per_s.is_nan() {
             return Err(Stalled);
         }
         let ends = duration_s < period_s;

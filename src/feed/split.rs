@@ -42,7 +42,9 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
     let breaks_lu = match &path.contour.kind {
         PieceKind::Block(Curve::Polynomial(curve)) => curve.breaks_lu(),
         PieceKind::Block(_) if !path.is_contour() => Vec::new(),
-        PieceKind::Blend(curve, _) if matches!(curve, Curve::Polynomial(_)) || !path.is_contour() => {
+        PieceKind::Blend(curve, _)
+            if matches!(curve, Curve::Polynomial(_) | Curve::Quintic(_)) || !path.is_contour() =>
+        {
             let scan = scan(rules, &path);
             let path_of = rules.path_limits.then_some(&rules.linear);
             let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1), path_of));

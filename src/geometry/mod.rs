@@ -10,6 +10,7 @@ mod fillet;
 mod line;
 mod polynomial;
 mod quadrature;
+mod quintic;
 mod rational;
 mod spatial_arc;
 
@@ -19,4 +20,5 @@ pub use curve::{Curve, CurveState, DISPLACEMENT_MIN_LU};
 pub use fillet::{ArcCorner, Fillet, Junction, NoFillet, PlaneArc, ROUNDING_DISTANCE_MAX_MM, Sense};
 pub use line::Line;
 pub use polynomial::PolynomialCurve;
+pub use quintic::{QuinticBlend, QuinticShape};
 pub use spatial_arc::SpatialArc;

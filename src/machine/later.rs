@@ -3,7 +3,7 @@
 //! In: a checked [`Machine`]. Out: one finding a value, by name, with what to write instead. `parse` shows them as warnings, `run` and
 //! `time` refuse with them as errors: nothing is ever replaced in silence.
 
-use super::checked::{BlendShape, Machine, TimeLawKind};
+use super::checked::{Machine, TimeLawKind};
 use super::choices::Choice;
 use crate::base::diagnostics::Diagnostic;
 
@@ -22,11 +22,8 @@ pub fn unsupported(machine: &Machine) -> Vec<Diagnostic> {
 }
 
 pub(super) fn later_values(machine: &Machine) -> Vec<Later> {
-    let (feed, smoothing) = (&machine.feed, &machine.smoothing);
-    let rows = [
-        (feed.time_law == TimeLawKind::Continuous, "feed", "time_law", feed.time_law.word(), "seven-phase"),
-        (smoothing.shape == BlendShape::Quintic, "smoothing", "shape", smoothing.shape.word(), "hermite3"),
-    ];
+    let feed = &machine.feed;
+    let rows = [(feed.time_law == TimeLawKind::Continuous, "feed", "time_law", feed.time_law.word(), "seven-phase")];
     let asked_for = rows.into_iter().filter(|(asked, ..)| *asked);
     asked_for.map(|(_, table, key, word, instead)| Later { table, key, word, instead }).collect()
 }

@@ -340,6 +340,7 @@ impl Smoother {
                     head.blocks_begun = before.head.blocks_begun;
                     match blend {
                         Curve::Blend(blend) => Curve::Blend(blend.starting_at(start)),
+                        Curve::Quintic(blend) => Curve::Quintic(blend.starting_at(start)),
                         other => other,
                     }
                 };

@@ -239,7 +239,8 @@ fn the_published_fillet_by_hand() {
         let (machine, _) = machine(false, signed);
         let planned = plan(&machine, program(&published(0.2), 10_000.0).paths(&machine));
         let entry = planned[1].law.at(0.0).velocity_lu_s;
-        assert!((entry - expected).abs() < 0.02, "{entry}");
+        // The radius is printed to two digits.
+        assert!((entry - expected).abs() < 0.04, "{entry}");
     }
 }
 
@@ -248,13 +249,13 @@ fn the_published_fillet_by_hand() {
 fn a_small_fillet_can_cost_more_than_a_stop_saves() {
     let (machine, _) = machine(false, true);
     let time_s = |contour: &[Block]| total_s(&plan(&machine, program(contour, 10_000.0).paths(&machine)));
-    let (fine, middle, coarse) = (time_s(&published(0.002)), time_s(&published(0.2)), time_s(&published(8.0)));
-    assert!(coarse < fine, "{fine} {middle} {coarse}");
     // Rest to rest over both arcs, by the model: two paths of one block each.
     let whole = chain(0.0, &[[40.0, 80.0_f64.to_radians()], [60.0, 80.0_f64.to_radians()]]);
     let (_, limits) = self::machine(false, true);
     let stopped: f64 = whole.iter().map(|block| model(&[*block], &limits).1).sum();
-    assert!(fine > stopped * 0.9, "{fine} {stopped}");
+    let (fine, middle, coarse) = (time_s(&published(0.002)), time_s(&published(0.2)), time_s(&published(8.0)));
+    // 1.077 s, 1.116 s, 1.045 s; 1.069 s with a stop.
+    assert!(middle > fine && middle > stopped && coarse < stopped, "{fine} {middle} {coarse} {stopped}");
 }
 
 /// Section 7, step 6: T_c, T_CAM, eta and r1 as the figures of a run.

@@ -2,6 +2,7 @@
 
 mod circular_contours;
 mod curves;
+mod printed_loop;
 mod profile;
 mod published;
 mod sampled;

@@ -4,4 +4,5 @@ mod compressor;
 mod inserts;
 mod modes;
 mod polylines;
+mod quintic;
 mod support;
