@@ -131,9 +131,9 @@ fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
 }
 
 #[test]
-fn a_machine_that_asks_for_what_is_not_built_is_refused_by_the_library_too() {
-    let set = "feed.time_law=continuous";
-    let loaded = machine("spinner_mvc850", &[set]);
+fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
+    let set = "smoothing.limits=path";
+    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous", set]);
     let options = RunOptions {
         machine: &loaded,
         setup: program(PROGRAM).into(),
@@ -144,7 +144,7 @@ fn a_machine_that_asks_for_what_is_not_built_is_refused_by_the_library_too() {
         threads: 1,
         pace_ratio: None,
     };
-    let refused = run(options, &mut |_| {}).err().expect("not built yet").0;
+    let refused = run(options, &mut |_| {}).err().expect("not under this law").0;
     assert!(refused.code == "M0201" && refused.message.contains(set.split('=').next().unwrap()), "{refused:?}");
 }
 

@@ -70,6 +70,20 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
     named(parts, &path.contour, length_lu)
 }
 
+/// The parts of a piece between places where its direction or curvature steps, at least one.
+pub(super) fn smooth_parts(path: JointPath) -> Vec<Part> {
+    let PieceKind::Block(Curve::Polynomial(curve)) = &path.contour.kind else {
+        return vec![Part { path, worst: None }];
+    };
+    let (length_lu, breaks_lu) = (curve.length_lu(), curve.breaks_lu());
+    if breaks_lu.is_empty() {
+        return vec![Part { path, worst: None }];
+    }
+    let borders: Vec<f64> = [0.0].into_iter().chain(breaks_lu).chain([length_lu]).collect();
+    let part = |range: &[f64]| Part { path: cut(&path, range[0], range[1]), worst: None };
+    named(borders.windows(2).map(part).collect(), &path.contour, length_lu)
+}
+
 /// Gives the first part what begins with the block and the last what ends with it.
 pub(super) fn named(mut parts: Vec<Part>, whole: &ContourPiece, length_lu: f64) -> Vec<Part> {
     let several = parts.len() > 1;
