@@ -11,7 +11,10 @@ mod limits;
 mod modes;
 mod planner;
 mod positioning;
+mod printed_arc;
 pub mod profile;
+mod programmed;
+mod published;
 pub mod ramp;
 mod scan;
 mod split;
@@ -20,4 +23,5 @@ mod wire;
 mod worst;
 
 pub use planner::Planner;
+pub use programmed::ProgrammedTime;
 pub use wire::*;
