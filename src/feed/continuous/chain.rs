@@ -14,7 +14,7 @@
 //! jerk. A stop is the same backwards.
 //! Does not know pieces, windows or time laws.
 
-use super::grid::{Derivatives, Interval};
+use super::grid::{AxisBound, Derivatives, Interval};
 use super::interior_point::{Outcome, Problem, Solver, Transition};
 use crate::feed::Limit;
 
@@ -78,6 +78,12 @@ const LOOSER_RATIOS: [f64; 3] = [0.0, 2e-4, 1.5e-3];
 
 /// Share of the estimate to begin with.
 const START_RATIO: f64 = 0.95;
+
+/// How far above its estimate b is thought to come.
+const REACH_RATIO: f64 = 1.5;
+
+/// Share of a chain, from its start, in which tangents must fit.
+const NEAR_SHARE: f64 = 0.6;
 
 /// b stays above this share of its estimate.
 const LOWEST_RATIO: f64 = 1e-6;
@@ -204,7 +210,9 @@ impl Planning {
         let far = |(estimate, point): (&f64, &PathPoint)| {
             (point.speed_squared_lu2_s2 / estimate - 1.0).abs() > STRAY_MAX_SHARE
         };
-        self.estimate.iter().zip(points).any(far)
+        // What lies far ahead is planned again, with this solution for an estimate.
+        let near = (NEAR_SHARE * points.len() as f64).ceil() as usize;
+        self.estimate.iter().zip(points).take(near).any(far)
     }
 
     /// The linear problem around the estimate.
@@ -232,7 +240,8 @@ impl Planning {
         }
         problem.costs_ratio.iter_mut().for_each(|cost| *cost /= total);
         for k in 0..=count {
-            let mut node = NodeRows { problem, scale: scale(k), fixed: k == 0 && start != Start::Rest };
+            let mut node =
+                NodeRows { problem, scale: scale(k), fixed: k == 0 && start != Start::Rest, estimate: estimate[k] };
             node.state(caps[k], k.checked_sub(1).map(|k| &intervals[first + k]), &intervals[first + k]);
             if k < count {
                 let interval = &intervals[first + k];
@@ -380,6 +389,8 @@ struct NodeRows<'a> {
     scale: Scale,
     /// The state is given: limits of it alone are no rows.
     fixed: bool,
+    /// b̂.
+    estimate: f64,
 }
 
 impl NodeRows<'_> {
@@ -405,7 +416,11 @@ impl NodeRows<'_> {
     }
 
     fn acceleration(&mut self, interval: &Interval, state: &Derivatives) {
-        for bound in &interval.bounds.axes {
+        let reach = Reach::of(interval, state, self.estimate);
+        for bound in leading(interval, |bound| bound.acceleration_lu_s2) {
+            if !reach.accelerates(bound, state) {
+                continue;
+            }
             let limit = interval.reserve_ratio * bound.acceleration_lu_s2;
             let (b, slope) = (state.second[bound.axis] / limit, 0.5 * state.first[bound.axis] / limit);
             if b != 0.0 || slope != 0.0 {
@@ -425,11 +440,17 @@ impl NodeRows<'_> {
             let lowest = self.scale.b;
             self.push([-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO);
         }
-        for bound in &interval.bounds.axes {
+        let straight = interval.is_straight();
+        let middle = 0.5 * (estimates[0] + estimates[1]);
+        let places = [(0, estimates[0]), (1, middle), (2, estimates[1])];
+        let reaches = places.map(|(place, estimate)| Reach::of(interval, &interval.states[place], estimate));
+        for bound in leading(interval, |bound| bound.jerk_lu_s3.unwrap_or(f64::INFINITY)) {
             let Some(jerk) = bound.jerk_lu_s3 else { continue };
             let axis = bound.axis;
-            let middle = 0.5 * (estimates[0] + estimates[1]);
-            for (place, estimate) in [(0, estimates[0]), (1, middle), (2, estimates[1])] {
+            for (place, estimate) in places {
+                if (straight && place == 1) || !reaches[place].jerks(bound, &interval.states[place]) {
+                    continue;
+                }
                 let state = &interval.states[place];
                 let limit = interval.reserve_ratio * jerk / estimate.sqrt();
                 let (b, slope, bend) =
@@ -446,6 +467,66 @@ impl NodeRows<'_> {
             }
         }
     }
+}
+
+/// What can happen at a place, about: more than that the axes that lead do not allow. Limits of others that stay far from it are no rows;
+/// whether they hold is looked at afterwards.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    straight: bool,
+    b: f64,
+    acceleration: f64,
+    jerk: f64,
+}
+
+impl Reach {
+    fn of(interval: &Interval, state: &Derivatives, estimate: f64) -> Self {
+        let b = REACH_RATIO * estimate;
+        let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
+        let straight = interval.is_straight();
+        if !straight {
+            for bound in &interval.bounds.axes {
+                let (first, second) = (state.first[bound.axis].abs(), state.second[bound.axis].abs());
+                acceleration = acceleration.min((bound.acceleration_lu_s2 + second * b) / first);
+            }
+            for bound in &interval.bounds.axes {
+                let bend = Self { straight, b, acceleration, jerk: 0.0 }.jerk_demand(bound, state);
+                let limit = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
+                jerk = jerk.min((limit + bend) / state.first[bound.axis].abs());
+            }
+        }
+        Self { straight, b, acceleration, jerk }
+    }
+
+    fn jerk_demand(&self, bound: &AxisBound, state: &Derivatives) -> f64 {
+        let axis = bound.axis;
+        let bend =
+            self.b.sqrt() * (state.third[axis].abs() * self.b + 3.0 * state.second[axis].abs() * self.acceleration);
+        if self.jerk > 0.0 { bend + state.first[axis].abs() * self.jerk } else { bend }
+    }
+
+    /// The axis may come near its acceleration.
+    fn accelerates(&self, bound: &AxisBound, state: &Derivatives) -> bool {
+        let (first, second) = (state.first[bound.axis].abs(), state.second[bound.axis].abs());
+        self.straight || !(second * self.b + first * self.acceleration < NEAR_RATIO * bound.acceleration_lu_s2)
+    }
+
+    /// The axis may come near its jerk.
+    fn jerks(&self, bound: &AxisBound, state: &Derivatives) -> bool {
+        let limit = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
+        self.straight || !(self.jerk_demand(bound, state) < NEAR_RATIO * limit)
+    }
+}
+
+/// The axes whose limits can bind: on a straight stretch, where every axis sees the same but for a factor, the one with the greatest.
+fn leading(interval: &Interval, limit: impl Fn(&AxisBound) -> f64) -> &[AxisBound] {
+    let axes = &interval.bounds.axes[..];
+    if !interval.is_straight() {
+        return axes;
+    }
+    let used = |bound: &AxisBound| interval.states[0].first[bound.axis].abs() / limit(bound);
+    let most = (0..axes.len()).reduce(|most, next| if used(&axes[next]) > used(&axes[most]) { next } else { most });
+    most.map_or(axes, |most| &axes[most..=most])
 }
 
 /// About the fastest rise of the speed along the path: the bend is left out.
@@ -582,12 +663,37 @@ impl Used {
 /// How much of its limits an interval uses at most, on the curve itself where it comes near them; NaN where b is not positive.
 fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
     let interval = &chain.intervals[index];
+    if interval.is_straight() {
+        return used_straight(interval, profile, chain, index);
+    }
     let rough = most_used(interval, profile, chain, index, &interval.eighths(None));
-    if rough < NEAR_RATIO || rough.is_nan() || interval.is_straight() {
+    if rough < NEAR_RATIO || rough.is_nan() {
         return rough;
     }
     let places = [0.25, 0.75].map(|share| interval.start_lu + share * interval.length_lu());
     most_used(interval, profile, chain, index, &interval.eighths(Some(places.map(|s_lu| look(index, s_lu)))))
+}
+
+/// The same on a straight stretch: the acceleration is greatest at an end, the jerk where b is.
+fn used_straight(interval: &Interval, profile: &Profile, chain: &Chain, index: usize) -> f64 {
+    let bend = profile.bends_per_s2[index];
+    let points = [0.0, 0.5, 1.0].map(|share| profile.inside(chain, index, share).0);
+    if points.iter().any(|point| !(point.speed_squared_lu2_s2 > 0.0)) {
+        return f64::NAN;
+    }
+    let ends = [points[0], points[2]];
+    // Where the slope changes its sign b may lie above its ends by as much as the parabola bulges.
+    let bulge = (0.125 * bend * interval.length_lu().powi(2)).abs();
+    let b = bulge + ends.iter().fold(0.0_f64, |most, point| most.max(point.speed_squared_lu2_s2));
+    let b = if ends[0].slope_lu_s2 * ends[1].slope_lu_s2 < 0.0 { b } else { b - bulge };
+    let slope = ends.iter().fold(0.0_f64, |most, point| most.max(point.slope_lu_s2.abs()));
+    let mut most = 0.0_f64;
+    for bound in &interval.bounds.axes {
+        let first = interval.states[0].first[bound.axis].abs();
+        most = most.max(0.5 * first * slope / bound.acceleration_lu_s2);
+        most = most.max(0.5 * first * bend.abs() * b.sqrt() / bound.jerk_lu_s3.unwrap_or(f64::INFINITY));
+    }
+    most
 }
 
 fn most_used(interval: &Interval, profile: &Profile, chain: &Chain, index: usize, states: &[Derivatives; 9]) -> f64 {

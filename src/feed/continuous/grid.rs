@@ -95,6 +95,7 @@ pub(super) struct Interval {
     /// Share of acceleration and jerk that planning uses.
     pub reserve_ratio: f64,
     pub bounds: Arc<Bounds>,
+    straight: bool,
 }
 
 /// All intervals of a piece.
@@ -103,7 +104,7 @@ pub(super) struct Grid {
     pub intervals: Vec<Interval>,
     /// The first, the last interval is that of a start from rest, of a stop.
     pub rests: [bool; 2],
-    /// Highest speed anywhere, and the way that a stop from it takes, about.
+    /// The way that a stop from its highest speed takes, about.
     pub stop_lu: f64,
 }
 
@@ -143,8 +144,7 @@ impl Interval {
 
     /// The derivatives are the same all along.
     pub fn is_straight(&self) -> bool {
-        let [from, middle, to] = &self.states;
-        from.first == middle.first && middle.first == to.first
+        self.straight
     }
 
     /// A part of it.
@@ -301,7 +301,8 @@ impl<'a> Cutter<'a> {
             self.cut_range(range[0], range[1]);
         }
         self.drop_idle_axes();
-        let v = self.top_lu_s;
+        let half_lu = 0.5 * self.length_lu;
+        let v = self.ends.iter().fold(self.top_lu_s, |v, end| v.min(self.reached_lu_s(*end, half_lu)));
         let ramp_s = v / self.acceleration_lu_s2
             + if self.bounds.jerk_limited { self.acceleration_lu_s2 / self.jerk_lu_s3 } else { 0.0 };
         Grid { intervals: self.intervals, rests, stop_lu: 0.5 * v * ramp_s }
@@ -356,6 +357,7 @@ impl<'a> Cutter<'a> {
             cap,
             reserve_ratio,
             bounds: self.bounds.clone(),
+            straight: self.straight.is_some(),
         });
     }
 
