@@ -1,5 +1,6 @@
 //! Tests of the room `feed`: closed forms, published figures, limits seen from outside.
 
+mod blocked;
 mod circular_contours;
 mod curves;
 mod printed_loop;
