@@ -12,6 +12,7 @@ mod planner;
 mod positioning;
 pub mod profile;
 pub mod ramp;
+mod rules;
 mod scan;
 mod split;
 mod varying;
@@ -19,4 +20,5 @@ mod wire;
 mod worst;
 
 pub use planner::Planner;
+pub use rules::{AxisCaps, PathRules, PieceRules};
 pub use wire::*;
