@@ -132,7 +132,7 @@ fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
 
 #[test]
 fn a_machine_that_asks_for_what_is_not_built_is_refused_by_the_library_too() {
-    for set in ["feed.time_law=continuous", "smoothing.shape=quintic", "feed.arc_limits=printed"] {
+    for set in ["feed.arc_limits=printed"] {
         let loaded = machine("spinner_mvc850", &[set]);
         let options = RunOptions {
             machine: &loaded,

@@ -11,7 +11,8 @@
 //! | `_deg`, `_deg_s`, `_rpm`, `_rot`, `_rot_s2`, `_rot_s3` | customary units of rotation: borders only |
 //! | `_um`, `_m`, `_m_min`, `_m_s2`, `_m_s3`, `_mm_min`, `_inch`, `_mh` | other customary units: borders only |
 //! | `_n_m`, `_kg_m2`, `_a`, `_v`, `_ohm`, `_h` | torque, inertia, current, voltage, resistance, inductance |
-//! | `_per_s`, `_per_mm` | 1/s, 1/mm (curvature) |
+//! | `_lu2_s2` | square of a speed |
+//! | `_per_s`, `_per_s2`, `_per_mm` | 1/s, 1/s², 1/mm (curvature) |
 //! | `_share`, `_ratio`, `_percent` | dimensionless |
 //!
 //! Products and quotients are written out: `_n_m_s_per_rad`, `_v_per_a`. `tests/tidy.rs` reads the list from this table.

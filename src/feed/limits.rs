@@ -209,15 +209,15 @@ impl AxisRules {
         let jerk_limited = self.jerk_limited;
         let in_block: JerkMax = |limits| limits.jerk_max_lu_s3;
         let in_blend: JerkMax = |limits| limits.transition_jerk_max_lu_s3;
+        if let Some(worst) = worst {
+            return self.curved(worst, if ends.blend { in_blend } else { in_block }, feed, jerk_limited);
+        }
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
             Curve::Arc(arc) => self.curved(&Worst::on_arc(arc), in_block, feed, jerk_limited),
             Curve::SpatialArc(arc) => self.curved(&Worst::on_spatial_arc(arc), in_block, feed, jerk_limited),
-            Curve::Polynomial(_) => match worst {
-                Some(worst) => self.curved(worst, if ends.blend { in_blend } else { in_block }, feed, jerk_limited),
-                // Unknown demands allow nothing: the planner refuses the piece.
-                None => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
-            },
+            // Unknown demands allow nothing: the planner refuses the piece.
+            Curve::Polynomial(_) | Curve::Quintic(_) => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
             Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
         }
     }

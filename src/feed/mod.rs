@@ -4,6 +4,7 @@
 //! `look_ahead.blocks` motion blocks beyond the one that it fixes. Does not sample.
 
 mod blend_limits;
+mod continuous;
 mod group;
 mod junction;
 mod limits;

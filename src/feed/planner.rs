@@ -9,6 +9,7 @@
 //! met; it is exact where the speed at the end is settled.) A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
 //! Does not sample, and does not know axes: `limits` and `junction` do.
 
+use super::continuous::{Continuous, Flow, Piece};
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
 use super::modes::ModeRules;
@@ -20,7 +21,7 @@ use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
 use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
-use crate::machine::Machine;
+use crate::machine::{Machine, TimeLawKind};
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -57,6 +58,8 @@ pub struct Planner {
     arrivals: Arrivals,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
+    /// The law `continuous`; `None` under `seven-phase`.
+    continuous: Option<Box<Continuous>>,
 }
 
 /// A piece in the window or before it.
@@ -94,6 +97,8 @@ enum Motion {
         /// The block's own share of the path, halves of its blends included, which must take one cycle at least; `None`: a blend.
         block_length_lu: Option<f64>,
     },
+    /// Along a curve, under the law `continuous`.
+    Flows(Box<Flow>),
     /// Stands still for a time.
     Waits { time_s: f64 },
     /// Stands still until these axes have arrived.
@@ -122,6 +127,7 @@ impl Planner {
             cutting_s: 0.0,
             arrivals: Arrivals::new(),
             half_blend_lu: 0.0,
+            continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
         }
     }
 
@@ -143,10 +149,14 @@ impl Planner {
 
     /// A piece whose F is the same all along.
     fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
-        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_)));
+        let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_) | Curve::Quintic(_)));
+        let scanned = polynomial || !path.is_contour();
         // A length that is no number is refused as it is.
-        if !polynomial || !path.length_lu().is_finite() {
+        if !scanned || !path.length_lu().is_finite() {
             return self.push_part(Part { path, worst: None });
+        }
+        if self.continuous.is_some() {
+            return split::smooth_parts(path).into_iter().try_for_each(|part| self.push_part(part));
         }
         let rules = self.rules.of(&path.contour.modes);
         split::parts(&rules, path).into_iter().try_for_each(|part| self.push_part(part))
@@ -162,18 +172,27 @@ impl Planner {
             PieceKind::Block(curve) | PieceKind::Blend(curve, _) if curve.length_lu() != 0.0 => {
                 let length_lu = curve.length_lu();
                 let blend = matches!(contour.kind, PieceKind::Blend(..));
+                let flows = self.continuous.is_some();
                 let (start, end) = (path.at(0.0), path.at(length_lu));
-                let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
+                // Under `continuous` a step of curvature is one, wherever it is.
+                let ends = Ends { start, end, blend: blend && !flows, rotary_only: curve.rotary_only() };
                 let rules = self.rules.of(&contour.modes);
                 corner = self
                     .last
                     .as_ref()
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
-                let limits = rules.piece(contour, curve, &ends, worst.as_ref());
-                check_motion(&limits, length_lu, &path)?;
-                self.last = Some((ends, rules));
-                let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
-                Motion::Moves { limits, length_lu, block_length_lu }
+                if flows {
+                    let flow = Flow::new(rules.clone(), &path, blend);
+                    check_flow(&flow, length_lu, &path)?;
+                    self.last = Some((ends, rules));
+                    Motion::Flows(Box::new(flow))
+                } else {
+                    let limits = rules.piece(contour, curve, &ends, worst.as_ref());
+                    check_motion(&limits, length_lu, &path)?;
+                    self.last = Some((ends, rules));
+                    let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
+                    Motion::Moves { limits, length_lu, block_length_lu }
+                }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
                 check_time(*time_s, &path)?;
@@ -207,7 +226,10 @@ impl Planner {
         if self.admitted == 0 || !(self.full || self.finished || self.rests > 0) {
             return None;
         }
-        self.plan_backward();
+        let flowing = self.flow();
+        if self.continuous.is_none() {
+            self.plan_backward();
+        }
         let ahead = if self.admitted > 1 { self.entries[1].entry.cap } else { self.end_of_window().cap };
         let front = self.entries.pop_front()?;
         let machine = self.rules.machine();
@@ -219,10 +241,11 @@ impl Planner {
                 let (time_s, limit) = self.arrivals.wait(machine, axes, self.elapsed_s);
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
+            Motion::Flows(_) => (flowing.unwrap_or_default(), STOP),
             _ => front.fixed(self.entry, ahead, self.setpoint_period_s),
         };
         self.elapsed_s += law.duration_s();
-        if matches!(front.motion, Motion::Moves { .. }) && front.path.contour.feed != Feed::Rapid {
+        if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_)) && front.path.contour.feed != Feed::Rapid {
             self.cutting_s += law.duration_s();
         }
         let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings };
@@ -237,6 +260,36 @@ impl Planner {
             self.rests -= usize::from(next.rests_before());
         }
         Some(piece)
+    }
+
+    /// The law of the front piece under `continuous`; `None` where it does not move.
+    fn flow(&mut self) -> Option<TimeLaw> {
+        let ends_path = self.window_ends_path();
+        let Self { continuous, entries, admitted, .. } = self;
+        let continuous = continuous.as_mut()?;
+        if !matches!(entries.front()?.motion, Motion::Flows(_)) {
+            return None;
+        }
+        if !continuous.holds_front() {
+            let mut pieces: Vec<Piece<'_>> = Vec::new();
+            for (index, entry) in entries.range_mut(..*admitted).take(PLANNED_PIECES_MAX).enumerate() {
+                let Entry { path, motion, corner, rests_after, .. } = entry;
+                if index > 0 && corner.velocity_lu_s == 0.0 {
+                    pieces.last_mut()?.rests_after = true;
+                    break;
+                }
+                let rests_after = *rests_after || (ends_path && index + 1 == *admitted);
+                match motion {
+                    Motion::Flows(flow) => pieces.push(Piece { path, flow, junction: *corner, rests_after }),
+                    _ => pieces.last_mut()?.rests_after |= rests_after,
+                }
+                if rests_after {
+                    break;
+                }
+            }
+            continuous.plan(&mut pieces);
+        }
+        continuous.take_front()
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.
@@ -290,7 +343,7 @@ impl Planner {
                 }
             }
             Motion::Waits { .. } | Motion::WaitsFor { .. } => self.half_blend_lu = 0.0,
-            Motion::Nothing => {}
+            Motion::Flows(_) | Motion::Nothing => {}
         }
     }
 
@@ -364,7 +417,7 @@ impl Entry {
             }
             Motion::Waits { time_s } => (standstill(*time_s, Limit { kind: LimitKind::Dwell, axis: None }), STOP),
             // A wait for axes gets its time where it is handed out.
-            Motion::WaitsFor { .. } => (TimeLaw::new([]), STOP),
+            Motion::WaitsFor { .. } | Motion::Flows(_) => (TimeLaw::new([]), STOP),
             Motion::Nothing => (TimeLaw::new([]), ahead.min(entry)),
         }
     }
@@ -380,7 +433,7 @@ impl Motion {
             }),
             Self::Moves { limits, .. } => limits.cap,
             Self::Waits { .. } | Self::WaitsFor { .. } => STOP,
-            Self::Nothing => FREE,
+            Self::Flows(_) | Self::Nothing => FREE,
         }
     }
 
@@ -395,9 +448,21 @@ impl Motion {
                 Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }
             }
             Self::Waits { .. } | Self::WaitsFor { .. } => REST,
-            Self::Nothing => exit,
+            Self::Flows(_) | Self::Nothing => exit,
         }
     }
+}
+
+/// Pieces that one plan of the law `continuous` looks at, at most.
+const PLANNED_PIECES_MAX: usize = 4096;
+
+/// As [`check_motion`], under `continuous`.
+fn check_flow(flow: &Flow, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+    let [first_lu_s, last_lu_s] = flow.ends_lu_s();
+    if [length_lu, first_lu_s, last_lu_s].iter().all(|number| number.is_finite() && *number > 0.0) {
+        return check_time(length_lu / first_lu_s.max(last_lu_s), path);
+    }
+    Err(no_speed(path))
 }
 
 /// A motion or wait longer than this is an alarm: 1e6 s are 11 days.
@@ -418,12 +483,16 @@ fn check_motion(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Resul
     if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
         return check_time(length_lu / limits.cap.velocity_lu_s, path);
     }
+    Err(no_speed(path))
+}
+
+fn no_speed(path: &JointPath) -> Box<Diagnostic> {
     let line = path.contour.block.line;
     let message = format!("the motion of line {line} has no speed that every axis allows");
-    Err(Box::new(
+    Box::new(
         Diagnostic::error("P0001", message)
             .help("look for coordinates far outside the machine, or a circle of hardly any radius"),
-    ))
+    )
 }
 
 /// The alarm of a motion or wait that lasts `time_s` at least.

@@ -93,7 +93,15 @@ pub fn standstill(time_s: f64, limit: Limit) -> TimeLaw {
 
 /// A phase of no length at rest.
 fn idle(limit: Limit) -> Phase {
-    Phase { duration_s: 0.0, start_lu: 0.0, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
+    Phase {
+        duration_s: 0.0,
+        start_lu: 0.0,
+        velocity_lu_s: 0.0,
+        acceleration_lu_s2: 0.0,
+        jerk_lu_s3: 0.0,
+        rate_per_s2: 0.0,
+        limit,
+    }
 }
 
 struct Builder<'a> {
@@ -122,6 +130,7 @@ impl Builder<'_> {
             velocity_lu_s: from_lu_s,
             acceleration_lu_s2: 0.0,
             jerk_lu_s3,
+            rate_per_s2: 0.0,
             limit: self.bounds.jerk,
         };
         let reached = first.at(jerk_time_s);
@@ -131,6 +140,7 @@ impl Builder<'_> {
             velocity_lu_s: reached.velocity_lu_s,
             acceleration_lu_s2,
             jerk_lu_s3: 0.0,
+            rate_per_s2: 0.0,
             limit: self.bounds.acceleration,
         };
         let reached = hold.at(hold_time_s);

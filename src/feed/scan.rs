@@ -12,7 +12,6 @@
 use super::limits::{AxisRules, FeedCap};
 use super::worst::Worst;
 use crate::base::{AxisId, AxisVector};
-use crate::geometry::Curve;
 use crate::kinematics::{JointPath, JointState};
 
 /// What linear interpolation between neighbours may miss of a demand.
@@ -57,10 +56,7 @@ impl Scan {
     pub(super) fn new(rules: &AxisRules, path: &JointPath, feed: FeedCap) -> Self {
         let scale = Scale { rules, feed };
         let length_lu = path.length_lu();
-        let nodes: Vec<f64> = match path.contour.curve() {
-            Some(Curve::Polynomial(curve)) => curve.nodes_lu().collect(),
-            _ => Vec::new(),
-        };
+        let nodes = path.nodes_lu();
         let look = |s_lu: f64| Place { s_lu, state: path.at(s_lu) };
         let mut places = vec![look(0.0)];
         for end_lu in nodes.into_iter().chain([length_lu]) {

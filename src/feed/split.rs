@@ -1,7 +1,7 @@
 //! Cuts a block whose bend varies into parts with a speed of their own.
 //!
 //! In: a piece of path. Out: its parts in order, each with the greatest demands on it: a line, arc or blend as it is, a spline or
-//! polynomial cut where its direction or curvature steps, and where the speed that it allows changes so much, and for so long, that
+//! polynomial (and any curve that the axes follow through a transformation) cut where its direction or curvature steps, and where the speed that it allows changes so much, and for so long, that
 //! changing the speed pays. Parts belong to the same block: the first has its events and its count, the last its stop.
 //!
 //! A change of speed ends without acceleration where a part ends, so that many short parts are slower than one. Borders are taken away
@@ -39,18 +39,21 @@ struct Stretch {
 
 /// The parts of a piece, at least one.
 pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
-    let curve = match &path.contour.kind {
-        PieceKind::Block(Curve::Polynomial(curve)) => curve,
-        PieceKind::Blend(Curve::Polynomial(_), _) => {
+    let breaks_lu = match &path.contour.kind {
+        PieceKind::Block(Curve::Polynomial(curve)) => curve.breaks_lu(),
+        PieceKind::Block(_) if !path.is_contour() => Vec::new(),
+        PieceKind::Blend(curve, _)
+            if matches!(curve, Curve::Polynomial(_) | Curve::Quintic(_)) || !path.is_contour() =>
+        {
             let scan = scan(rules, &path);
             let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1)));
             return vec![Part { path, worst }];
         }
         _ => return vec![Part { path, worst: None }],
     };
-    let length_lu = curve.length_lu();
+    let length_lu = path.length_lu();
     let mut borders = vec![0.0];
-    borders.extend(curve.breaks_lu());
+    borders.extend(breaks_lu);
     borders.push(length_lu);
     let mut parts = Vec::new();
     for range in borders.windows(2) {
@@ -64,6 +67,20 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
         }
     }
     named(parts, &path.contour, length_lu)
+}
+
+/// The parts of a piece between places where its direction or curvature steps, at least one.
+pub(super) fn smooth_parts(path: JointPath) -> Vec<Part> {
+    let PieceKind::Block(Curve::Polynomial(curve)) = &path.contour.kind else {
+        return vec![Part { path, worst: None }];
+    };
+    let (length_lu, breaks_lu) = (curve.length_lu(), curve.breaks_lu());
+    if breaks_lu.is_empty() {
+        return vec![Part { path, worst: None }];
+    }
+    let borders: Vec<f64> = [0.0].into_iter().chain(breaks_lu).chain([length_lu]).collect();
+    let part = |range: &[f64]| Part { path: cut(&path, range[0], range[1]), worst: None };
+    named(borders.windows(2).map(part).collect(), &path.contour, length_lu)
 }
 
 /// Gives the first part what begins with the block and the last what ends with it.
@@ -108,6 +125,7 @@ pub(super) fn cut(path: &JointPath, from_lu: f64, to_lu: f64) -> JointPath {
             block_length_lu: *block_length_lu,
             stop_at_end: false,
         },
+        transformation: path.transformation.clone(),
     }
 }
 

@@ -69,7 +69,8 @@ impl LimitKind {
     }
 }
 
-/// A stretch of constant jerk along the path.
+/// A stretch of the path with one law of motion: `d²s/dt² = a + j t + k (s - s_start)`, where `j` or `k` is 0. Constant jerk (`k = 0`)
+/// is what a ramp in time is made of; with `j = 0` the square of the speed is a parabola in s, and the jerk is `k v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phase {
     /// Length in time.
@@ -82,15 +83,18 @@ pub struct Phase {
     pub acceleration_lu_s2: f64,
     /// Path jerk, constant (0 under BRISK, where acceleration steps).
     pub jerk_lu_s3: f64,
+    /// Change of the path acceleration with the path, `k`; 0 where the jerk is constant.
+    pub rate_per_s2: f64,
     /// What holds the motion back here.
     pub limit: Limit,
 }
 
 /// s(t) over one piece: phases in order, without gaps.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimeLaw {
-    phases: [Phase; 7],
-    count: usize,
+    phases: Vec<Phase>,
+    /// When each phase begins.
+    starts_s: Vec<f64>,
     duration_s: f64,
 }
 
@@ -110,21 +114,12 @@ pub struct PathState {
 }
 
 impl TimeLaw {
-    /// Joins at most seven phases; those of zero length are dropped. Panics on more than seven.
+    /// Joins phases; those of zero length are dropped.
     pub fn new(phases: impl IntoIterator<Item = Phase>) -> Self {
-        let idle = Limit { kind: LimitKind::Feed, axis: None };
-        let empty = Phase {
-            duration_s: 0.0,
-            start_lu: 0.0,
-            velocity_lu_s: 0.0,
-            acceleration_lu_s2: 0.0,
-            jerk_lu_s3: 0.0,
-            limit: idle,
-        };
-        let mut law = Self { phases: [empty; 7], count: 0, duration_s: 0.0 };
+        let mut law = Self::default();
         for phase in phases.into_iter().filter(|phase| phase.duration_s > 0.0) {
-            law.phases[law.count] = phase;
-            law.count += 1;
+            law.starts_s.push(law.duration_s);
+            law.phases.push(phase);
             law.duration_s += phase.duration_s;
         }
         law
@@ -132,7 +127,7 @@ impl TimeLaw {
 
     /// The phases in order.
     pub fn phases(&self) -> &[Phase] {
-        &self.phases[..self.count]
+        &self.phases
     }
 
     /// Time from start to end of the piece.
@@ -142,31 +137,72 @@ impl TimeLaw {
 
     /// State `time_s` after the start of the piece; clamped to its ends. A law without phases is at rest at 0.
     pub fn at(&self, time_s: f64) -> PathState {
-        let mut rest_s = time_s.max(0.0);
-        let phases = self.phases();
-        for (i, phase) in phases.iter().enumerate() {
-            if rest_s <= phase.duration_s || i + 1 == phases.len() {
-                return phase.at(rest_s.min(phase.duration_s));
-            }
-            rest_s -= phase.duration_s;
-        }
-        let phase = self.phases[0];
-        PathState { position_lu: 0.0, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit: phase.limit }
+        let index = self.starts_s.partition_point(|start_s| *start_s < time_s).saturating_sub(1);
+        let Some(phase) = self.phases.get(index) else { return PathState::at_rest() };
+        phase.at((time_s - self.starts_s[index]).max(0.0).min(phase.duration_s))
+    }
+}
+
+impl PathState {
+    /// Nothing moves, at 0.
+    fn at_rest() -> Self {
+        let limit = Limit { kind: LimitKind::Feed, axis: None };
+        Self { position_lu: 0.0, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
     }
 }
 
 impl Phase {
     /// State `time_s` after the start of the phase.
     pub fn at(&self, time_s: f64) -> PathState {
-        let (t, j) = (time_s, self.jerk_lu_s3);
+        let (t, j, k) = (time_s, self.jerk_lu_s3, self.rate_per_s2);
         let (v, a) = (self.velocity_lu_s, self.acceleration_lu_s2);
+        if k == 0.0 {
+            return PathState {
+                position_lu: self.start_lu + t * (v + t * (a / 2.0 + t * j / 6.0)),
+                velocity_lu_s: v + t * (a + t * j / 2.0),
+                acceleration_lu_s2: a + t * j,
+                jerk_lu_s3: j,
+                limit: self.limit,
+            };
+        }
+        // The solution of s'' = a + k s: with z = k t² that of sinh and cosh, for k < 0 that of sin and cos.
+        let z = k * t * t;
+        let [first, second] = [sine_ratio(z), cosine_ratio(z)];
+        let velocity_lu_s = v * (1.0 + z * second) + a * t * first;
         PathState {
-            position_lu: self.start_lu + t * (v + t * (a / 2.0 + t * j / 6.0)),
-            velocity_lu_s: v + t * (a + t * j / 2.0),
-            acceleration_lu_s2: a + t * j,
-            jerk_lu_s3: j,
+            position_lu: self.start_lu + t * (v * first + a * t * second),
+            velocity_lu_s,
+            acceleration_lu_s2: a * (1.0 + z * second) + k * v * t * first,
+            jerk_lu_s3: k * velocity_lu_s,
             limit: self.limit,
         }
+    }
+}
+
+/// Below this |z| the series of [`sine_ratio`] and [`cosine_ratio`] are exact to the last bit or two.
+const SERIES_MAX_RATIO: f64 = 0.5;
+
+/// sinh(x)/x with z = x²; sin(x)/x with z = -x².
+fn sine_ratio(z: f64) -> f64 {
+    if z.abs() <= SERIES_MAX_RATIO {
+        let tail = 1.0 + z / 110.0 * (1.0 + z / 156.0 * (1.0 + z / 210.0));
+        1.0 + z / 6.0 * (1.0 + z / 20.0 * (1.0 + z / 42.0 * (1.0 + z / 72.0 * tail)))
+    } else if z > 0.0 {
+        z.sqrt().sinh() / z.sqrt()
+    } else {
+        (-z).sqrt().sin() / (-z).sqrt()
+    }
+}
+
+/// (cosh(x) - 1)/x² with z = x²; (1 - cos(x))/x² with z = -x².
+fn cosine_ratio(z: f64) -> f64 {
+    if z.abs() <= SERIES_MAX_RATIO {
+        let tail = 1.0 + z / 90.0 * (1.0 + z / 132.0 * (1.0 + z / 182.0));
+        0.5 * (1.0 + z / 12.0 * (1.0 + z / 30.0 * (1.0 + z / 56.0 * tail)))
+    } else if z > 0.0 {
+        (z.sqrt().cosh() - 1.0) / z
+    } else {
+        ((-z).sqrt().cos() - 1.0) / z
     }
 }
 

@@ -1,13 +1,14 @@
 //! One curve of the contour, whatever its shape.
 //!
-//! In: a [`Line`], [`Arc`], [`SpatialArc`], [`PolynomialCurve`] or [`HermiteBlend`]. Out: position and derivatives at any arc length, exact ends, parts of it.
+//! In: a [`Line`], [`Arc`], [`SpatialArc`], [`PolynomialCurve`], [`HermiteBlend`] or [`QuinticBlend`]. Out: position and derivatives at
+//! any arc length, exact ends, parts of it.
 //!
 //! The parameter s is the arc length of the linear axes in mm; rotary axes are functions of the same s and do not count. Where no
 //! linear axis moves, s is sqrt(sum of squares) of the rotary travel in rad ([`Curve::rotary_only`]).
 //!
 //! Does not hold the block, the feed or the neighbours of a curve: that is the contour's.
 
-use super::{Arc, HermiteBlend, Line, PolynomialCurve, SpatialArc};
+use super::{Arc, HermiteBlend, Line, PolynomialCurve, QuinticBlend, SpatialArc};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 
 /// Motion shorter than this is none: a picometre, far below the resolution of any control (1 nm to 1 µm) and far above the
@@ -27,8 +28,10 @@ pub enum Curve {
     SpatialArc(SpatialArc),
     /// Spline or polynomial.
     Polynomial(PolynomialCurve),
-    /// Corner blend.
+    /// Corner blend, the published cubic.
     Blend(HermiteBlend),
+    /// Corner blend without a step of curvature.
+    Quintic(QuinticBlend),
 }
 
 /// A curve at one place, with derivatives to s (lu per mm, per mm², per mm³; per rad where only rotary axes move).
@@ -53,6 +56,7 @@ impl Curve {
             Self::SpatialArc(arc) => arc.length_lu(),
             Self::Polynomial(curve) => curve.length_lu(),
             Self::Blend(blend) => blend.length_lu(),
+            Self::Quintic(blend) => blend.length_lu(),
         }
     }
 
@@ -63,7 +67,7 @@ impl Curve {
             Self::Arc(arc) => arc.rotary_only(),
             Self::SpatialArc(arc) => arc.rotary_only(),
             Self::Polynomial(curve) => curve.rotary_only(),
-            Self::Blend(_) => false,
+            Self::Blend(_) | Self::Quintic(_) => false,
         }
     }
 
@@ -75,6 +79,7 @@ impl Curve {
             Self::SpatialArc(arc) => arc.start(),
             Self::Polynomial(curve) => curve.start(),
             Self::Blend(blend) => blend.start(),
+            Self::Quintic(blend) => blend.start(),
         }
     }
 
@@ -86,6 +91,7 @@ impl Curve {
             Self::SpatialArc(arc) => arc.end(),
             Self::Polynomial(curve) => curve.end(),
             Self::Blend(blend) => blend.end(),
+            Self::Quintic(blend) => blend.end(),
         }
     }
 
@@ -97,6 +103,7 @@ impl Curve {
             Self::SpatialArc(arc) => arc.at(s_lu),
             Self::Polynomial(curve) => curve.at(s_lu),
             Self::Blend(blend) => blend.at(s_lu),
+            Self::Quintic(blend) => blend.at(s_lu),
         }
     }
 
@@ -115,6 +122,7 @@ impl Curve {
             Self::SpatialArc(arc) => Self::SpatialArc(arc.trimmed(start_lu, end_lu)),
             Self::Polynomial(curve) => Self::Polynomial(curve.trimmed(start_lu, end_lu)),
             Self::Blend(blend) => Self::Blend(blend.trimmed(start_lu, end_lu)),
+            Self::Quintic(blend) => Self::Quintic(blend.trimmed(start_lu, end_lu)),
         }
     }
 }

@@ -105,6 +105,12 @@ impl PolynomialCurve {
         borders.filter(|s_lu| *s_lu > 0.0 && *s_lu < self.length_lu)
     }
 
+    /// Places inside where one polynomial ends and the next begins, in order.
+    pub fn knots_lu(&self) -> impl Iterator<Item = f64> {
+        let pairs = self.own_panels().windows(2).filter(|pair| pair[0].piece != pair[1].piece);
+        pairs.map(|pair| pair[1].lengths_lu[0] - self.offset_lu)
+    }
+
     /// Places inside where the direction or the curvature steps, in order.
     pub fn breaks_lu(&self) -> Vec<f64> {
         let pairs = self.own_panels().windows(2);

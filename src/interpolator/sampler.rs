@@ -173,6 +173,7 @@ impl Interpolator {
             self.overlay.set_out(motion, k, carry_s);
         }
         let programmed_feed_lu_s = programmed_feed_lu_s(&piece);
+        let displacement_lu = piece.path.displacement_lu();
         let contour = &mut piece.path.contour;
         let events = std::mem::take(&mut contour.events);
         let corner = match &contour.kind {
@@ -192,7 +193,7 @@ impl Interpolator {
             entry_feed_lu_s: piece.law.at(0.0).velocity_lu_s,
             programmed_feed_lu_s,
             length_lu,
-            displacement_lu: contour.curve().map_or(AxisVector::zero(), |curve| curve.end().0 - curve.start().0),
+            displacement_lu,
             rotary_only,
             duration_s: piece.law.duration_s(),
             before_tick_s: carry_s.max(0.0),

@@ -26,9 +26,9 @@ const DIRECTION_MIN_RATIO: f64 = 1e-12;
 /// The chain of one machine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kinematics {
-    geometry_axes: [Option<AxisId>; 3],
-    table: Vec<Joint>,
-    head: Vec<Joint>,
+    pub(super) geometry_axes: [Option<AxisId>; 3],
+    pub(super) table: Vec<Joint>,
+    pub(super) head: Vec<Joint>,
 }
 
 /// Unit vector, dimensionless.
@@ -49,11 +49,12 @@ pub struct ToolPose {
     pub orientation_quaternion_xyzw: Quaternion,
 }
 
+/// A rotary joint of the chain.
 #[derive(Clone, Debug, PartialEq)]
-struct Joint {
-    axis: AxisId,
-    direction: Unit<Vector3<f64>>,
-    point: Point3<f64>,
+pub(super) struct Joint {
+    pub(super) axis: AxisId,
+    pub(super) direction: Unit<Vector3<f64>>,
+    pub(super) point: Point3<f64>,
 }
 
 impl Kinematics {
@@ -67,9 +68,9 @@ impl Kinematics {
         Self { geometry_axes: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)), table, head }
     }
 
-    /// The motion of the axes that drives a piece of contour.
+    /// The motion of the axes that drives a piece of contour, without a transformation.
     pub fn to_joint(&self, piece: ContourPiece) -> JointPath {
-        JointPath { contour: piece }
+        JointPath { contour: piece, transformation: None }
     }
 
     /// Pose of a tool without length when the axes stand at `posture`.

@@ -3,7 +3,7 @@
 //! In: a checked [`Machine`]. Out: one finding a value, by name, with what to write instead. `parse` shows them as warnings, `run` and
 //! `time` refuse with them as errors: nothing is ever replaced in silence.
 
-use super::checked::{ArcLimits, BlendLaw, BlendLimits, BlendShape, CurvatureJump, Machine, TimeLawKind};
+use super::checked::{ArcLimits, BlendLaw, BlendLimits, CurvatureJump, Machine};
 use super::choices::Choice;
 use crate::base::diagnostics::Diagnostic;
 
@@ -24,11 +24,9 @@ pub fn unsupported(machine: &Machine) -> Vec<Diagnostic> {
 pub(super) fn later_values(machine: &Machine) -> Vec<Later> {
     let (feed, smoothing) = (&machine.feed, &machine.smoothing);
     let rows = [
-        (feed.time_law == TimeLawKind::Continuous, "feed", "time_law", feed.time_law.word(), "seven-phase"),
         (feed.curvature_jump == CurvatureJump::Printed, "feed", "curvature_jump", feed.curvature_jump.word(), "signed"),
         (feed.arc_limits == ArcLimits::Printed, "feed", "arc_limits", feed.arc_limits.word(), "worst"),
         (smoothing.blend_law == BlendLaw::Published, "smoothing", "blend_law", smoothing.blend_law.word(), "limits"),
-        (smoothing.shape == BlendShape::Quintic, "smoothing", "shape", smoothing.shape.word(), "hermite3"),
         (smoothing.limits == BlendLimits::Path, "smoothing", "limits", smoothing.limits.word(), "axis"),
     ];
     let asked_for = rows.into_iter().filter(|(asked, ..)| *asked);

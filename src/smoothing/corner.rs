@@ -9,21 +9,24 @@
 //! | G641 | corners | ADIS or ADISPOS of both blocks | as G642 |
 //! | G642 | corners | beta times CTOL, no axis further than its ATOL | models/local-smoothing.md section 1 [Essid 2019] |
 //! | G643 | corners | every axis over its own range, as its ATOL or CTOL allows | polynomials, one range an axis |
-//! | G644 | corners | as far as the machine's axis tolerance allows, CTOL and ATOL do not count | one polynomial |
+//! | G644 | corners | until the axes can pass at the feed (`dynamics`), as far as the machine's axis tolerance allows; CTOL and ATOL do not count | one polynomial |
 //! | G645 | as G642, and tangential joints with a step of curvature | there: `transition_tolerance_mm` | as G642; a polynomial |
 //!
-//! Where an arc, another curve or a rotary axis takes part, a polynomial takes the place of the published blend; rotary axes keep
-//! OTOL. G643 has one range for all axes there. A blend never takes more than half of a block. Between two rapids G642, G643 and
+//! With `shape = "quintic"` the blend of G641, G642 and G645 between lines is one without a step of curvature, and rotary axes go along
+//! with it; `models/local-smoothing.md` section 1 has the published one. Where an arc or another curve takes part (with the published
+//! shape also a rotary axis), a polynomial takes its place; rotary axes keep OTOL. G643 has one range for all axes there. A blend never takes more than half of a block. Between two rapids G642, G643 and
 //! G645 have their tolerances times STOLF; next to one rapid they do not.
 //!
 //! Does not cut the blocks: that is the smoother's.
 
 use super::Corner;
-use super::transition::{Pair, Tolerances, Transition, common, per_axis};
+use super::dynamics::Dynamics;
+use super::transition::{Pair, Tolerances, Transition, common, enough, per_axis};
 use crate::base::{AxisVector, PartPoint, PerAxis};
-use crate::geometry::{Curve, DISPLACEMENT_MIN_LU, HermiteBlend, Line};
+use crate::geometry::{Curve, CurveState, DISPLACEMENT_MIN_LU, HermiteBlend, Line, QuinticShape};
 use crate::interpreter::{Feed, Modes};
-use crate::machine::{Machine, PathMode, SmoothingSettings};
+use crate::machine::{BlendShape, Machine, PathMode, SmoothingSettings};
+use std::sync::Arc;
 
 /// Turning angles below this are rounding of programmed points: no blend and no `corners` entry.
 pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
@@ -38,6 +41,9 @@ const DIRECTION_MIN_RATIO: f64 = 1e-9;
 
 /// Steps of curvature below this are none: a radius of a kilometre beside a line.
 const CURVATURE_STEP_MIN_PER_MM: f64 = 1e-6;
+
+/// The same as share of the greater curvature: rounding of a fitted curve.
+const CURVATURE_STEP_MIN_RATIO: f64 = 1e-6;
 
 /// One of the two blocks at a junction.
 pub(super) struct Side<'a> {
@@ -68,11 +74,13 @@ pub(super) enum Junction {
 pub(super) struct Rules {
     settings: SmoothingSettings,
     linear: PerAxis<bool>,
+    machine: Arc<Machine>,
 }
 
 impl Rules {
     pub(super) fn new(machine: &Machine) -> Self {
-        Self { settings: machine.smoothing.clone(), linear: machine.linear_mask() }
+        let (settings, linear) = (machine.smoothing.clone(), machine.linear_mask());
+        Self { settings, linear, machine: Arc::new(machine.clone()) }
     }
 
     /// Axes whose travel counts as path length.
@@ -100,14 +108,9 @@ impl Rules {
         // A NaN is no corner.
         let turns = angle_rad >= CORNER_ANGLE_MIN_RAD;
         if !turns {
-            // Between two lines there is nothing to do; a compressed stretch has been made smooth.
-            let smooth = |curve: &Curve| matches!(curve, Curve::Line(_) | Curve::Polynomial(_));
-            let steps = (v.second - u.second).masked(&self.linear).norm() > CURVATURE_STEP_MIN_PER_MM;
-            if mode != PathMode::G645
-                || (smooth(before.curve) && smooth(after.curve))
-                || !steps
-                || before.curve.end() != after.curve.start()
-            {
+            let lines = matches!((before.curve, after.curve), (Curve::Line(_), Curve::Line(_)));
+            let apart = before.curve.end() != after.curve.start();
+            if mode != PathMode::G645 || lines || apart || !steps(&u, &v) {
                 return Junction::Pass;
             }
             let tolerances = self.tolerances(self.settings.transition_tolerance_mm, before.modes, 1.0);
@@ -131,10 +134,10 @@ impl Rules {
         let joined = match (mode, lines, linear_only) {
             (PathMode::G643 | PathMode::G644, ..) | (_, _, None) if apart => Some(Junction::Pass),
             (PathMode::G643, Some(lines), _) => self.block_internal(lines, before, after, angle_rad, &room),
-            (PathMode::G644, ..) => {
-                let tolerances = self.machine_tolerances();
-                self.polynomial(before, after, angle_rad, &room, &tolerances)
+            (_, Some(lines), _) if self.settings.shape == BlendShape::Quintic && self.has_corner(&u, &v) => {
+                self.quintic(lines, before, after, angle_rad, &room)
             }
+            (PathMode::G644, ..) => self.dynamic(before, after, angle_rad, &room, [&u, &v]),
             (_, _, Some(lines)) => Some(self.published(lines, before, after, angle_rad, &room)),
             _ => self.general(before, after, angle_rad, &room, [&u.first, &v.first]),
         };
@@ -157,6 +160,51 @@ impl Rules {
         // Of the clamped T, so that the tolerance only gets smaller.
         let tolerance_mm = 0.25 * t * (4.0 - alpha) * (angle_rad / 2.0).sin();
         Junction::Blend(Curve::Blend(blend), Corner { angle_rad, tolerance_mm, transition_length_mm: t })
+    }
+
+    /// The blend without a step of curvature, rotary axes along.
+    fn quintic(
+        &self,
+        lines: [&Line; 2],
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+    ) -> Option<Junction> {
+        let [u, v] = lines.map(Line::direction);
+        let shape = QuinticShape::new(u, v, &self.linear)?;
+        let within = |tolerances: &Tolerances| {
+            1.0 / tolerances.share(&(*shape.inward() * shape.deviation_ratio()), &self.linear)
+        };
+        let wanted_lu = match before.modes.path_mode {
+            PathMode::G641 => self.rounding_distance_mm(before, after),
+            PathMode::G644 => {
+                let [second, third] = shape.greatest_bends();
+                let dynamics = Dynamics::new(&self.machine, before, after, lines.map(|line| line.at(0.0)).each_ref());
+                dynamics.needed_lu(&second, &third).min(within(&self.machine_tolerances()))
+            }
+            _ => within(&self.contour_tolerances(before, after, [u, v])),
+        };
+        let t = room.clamped(wanted_lu);
+        let blend = shape.blend(lines[0].end(), t)?;
+        // Of the clamped T, so that the tolerance only gets smaller.
+        let tolerance_mm = t * shape.deviation_ratio();
+        Some(Junction::Blend(Curve::Quintic(blend), Corner { angle_rad, tolerance_mm, transition_length_mm: t }))
+    }
+
+    /// G644: as far as the axes need, as their tolerances allow.
+    fn dynamic(
+        &self,
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+        ends: [&CurveState; 2],
+    ) -> Option<Junction> {
+        let dynamics = Dynamics::new(&self.machine, before, after, ends);
+        let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
+        let room = room.up_to(enough(&pair, room.clamped(f64::INFINITY), &dynamics));
+        self.polynomial(before, after, angle_rad, &room, &self.machine_tolerances())
     }
 
     /// G643 between lines.
@@ -194,8 +242,7 @@ impl Rules {
                 self.polynomial(before, after, angle_rad, room, &tolerances)
             }
             _ => {
-                let contour_mm = self.beta(u, v) * self.contour_tolerance_mm(before, after);
-                let tolerances = self.tolerances(contour_mm, before.modes, self.rapid_factor(before, after));
+                let tolerances = self.contour_tolerances(before, after, [u, v]);
                 self.polynomial(before, after, angle_rad, room, &tolerances)
             }
         }
@@ -247,6 +294,12 @@ impl Rules {
         } else {
             self.settings.tolerance_ratio
         }
+    }
+
+    /// Those of G642: beta times CTOL, with ATOL of every axis and OTOL of the rotary ones.
+    fn contour_tolerances(&self, before: &Side<'_>, after: &Side<'_>, [u, v]: [&AxisVector; 2]) -> Tolerances {
+        let contour_mm = self.beta(u, v) * self.contour_tolerance_mm(before, after);
+        self.tolerances(contour_mm, before.modes, self.rapid_factor(before, after))
     }
 
     fn contour_tolerance_mm(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
@@ -322,6 +375,11 @@ impl Rules {
         (angle_rad / 2.0).cos() < REVERSAL_COS_MIN
     }
 
+    /// The linear axes have a corner.
+    fn has_corner(&self, u: &CurveState, v: &CurveState) -> bool {
+        turning_angle(&u.first.masked(&self.linear), &v.first.masked(&self.linear)) >= CORNER_ANGLE_MIN_RAD
+    }
+
     fn moves_rotary(&self, line: &Line) -> bool {
         let (start, end) = (line.start().0, line.end().0);
         start.masked(&self.linear.map(|is| !is)) != end.masked(&self.linear.map(|is| !is))
@@ -381,6 +439,12 @@ fn turning_angle(incoming: &AxisVector, outgoing: &AxisVector) -> f64 {
     let u = *incoming * (1.0 / incoming.norm());
     let v = *outgoing * (1.0 / outgoing.norm());
     2.0 * (v - u).norm().atan2((v + u).norm())
+}
+
+/// The curvature, or the second derivative of a rotary axis, is another one.
+fn steps(end: &CurveState, start: &CurveState) -> bool {
+    let bend = end.second.norm().max(start.second.norm());
+    (start.second - end.second).norm() > CURVATURE_STEP_MIN_PER_MM.max(CURVATURE_STEP_MIN_RATIO * bend)
 }
 
 /// Some axis changes its sense; one that starts or stops moving does not count.

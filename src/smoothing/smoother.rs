@@ -340,6 +340,7 @@ impl Smoother {
                     head.blocks_begun = before.head.blocks_begun;
                     match blend {
                         Curve::Blend(blend) => Curve::Blend(blend.starting_at(start)),
+                        Curve::Quintic(blend) => Curve::Quintic(blend.starting_at(start)),
                         other => other,
                     }
                 };
@@ -432,7 +433,7 @@ impl Head {
 }
 
 /// The lower of two feeds.
-fn lower(first: &Feed, second: &Feed) -> Feed {
+pub(super) fn lower(first: &Feed, second: &Feed) -> Feed {
     let near = |feed: &Feed, last: bool| match feed {
         Feed::Rapid => None,
         Feed::Path { feed_lu_s } => Some(*feed_lu_s),

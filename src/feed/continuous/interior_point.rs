@@ -1,0 +1,391 @@
+//! The fastest profile of a chain of intervals under linear limits: a primal-dual interior-point method that knows the chain.
+//!
+//! In: a [`Problem`]: for every interval how the state `x = (b, b')` at its start and the control `u = b''` give the state at its
+//! end, the limits `a . (x, u) <= d` that hold there, and the cost. Out: states and controls in [`Solver`]. All numbers are scaled by the caller to
+//! the order of 1.
+//!
+//! Minimised is `sum c_i / sqrt(b_i)`, the time: convex where b > 0. Each step of Mehrotra's predictor-corrector method is a linear-quadratic
+//! problem along the chain, solved by a Riccati recursion over 2 x 2 matrices, so that its cost goes with the number of intervals
+//! [Mehrotra 1992; Rao 1998]. The states need not obey the chain to begin with.
+//!
+//! The last interval has no control of its own (`b = 0` in its transition): the state at the end lies on a ray. The first state is
+//! given, or any point of a ray.
+//! Does not know what b, limits and intervals mean.
+
+/// One limit: `a . (x0, x1, u) <= bound`, with its slack and multiplier.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    a: [f64; 3],
+    bound: f64,
+    slack: f64,
+    multiplier: f64,
+    weight: f64,
+    residual: f64,
+    slack_step: f64,
+    multiplier_step: f64,
+    correction: f64,
+}
+
+/// From the state at the start of an interval to that at its end: `x+ = A x + B u`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Transition {
+    /// A by rows.
+    pub state_ratio: [f64; 4],
+    /// B; zeros: the interval has no control.
+    pub control_ratio: [f64; 2],
+}
+
+/// What is to be solved.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Problem {
+    rows: Vec<Row>,
+    /// Rows of node i are `ends[i - 1] .. ends[i]`.
+    ends: Vec<usize>,
+    /// c of every node.
+    pub costs_ratio: Vec<f64>,
+    /// Of every interval.
+    pub transitions: Vec<Transition>,
+    /// The first state is a point of this ray; `None`: it is given.
+    pub start_ray_ratio: Option<[f64; 2]>,
+}
+
+impl Problem {
+    /// Forgets everything but its memory.
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.ends.clear();
+        self.costs_ratio.clear();
+        self.transitions.clear();
+        self.start_ray_ratio = None;
+    }
+
+    /// A limit of the node at hand and the interval after it.
+    pub fn limit(&mut self, a_ratio: [f64; 3], bound_ratio: f64) {
+        self.rows.push(Row {
+            a: a_ratio,
+            bound: bound_ratio,
+            slack: 0.0,
+            multiplier: 0.0,
+            weight: 0.0,
+            residual: 0.0,
+            slack_step: 0.0,
+            multiplier_step: 0.0,
+            correction: 0.0,
+        });
+    }
+
+    /// Limits of the node at hand so far, to be rewritten in place where the interval after it has no control.
+    pub fn without_control(&mut self, feedback_ratio: [f64; 2]) {
+        let start = self.ends.last().copied().unwrap_or(0);
+        for row in &mut self.rows[start..] {
+            row.a = [row.a[0] + row.a[2] * feedback_ratio[0], row.a[1] + row.a[2] * feedback_ratio[1], 0.0];
+        }
+    }
+
+    /// Every limit counts as so much wider.
+    pub fn loosen(&mut self, by_ratio: f64) {
+        self.rows.iter_mut().for_each(|row| row.bound += by_ratio * row.bound.abs().min(1.0));
+    }
+
+    /// The limits of the node at hand are complete.
+    pub fn end_node(&mut self) {
+        self.ends.push(self.rows.len());
+    }
+}
+
+/// Work of one node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    state: [f64; 2],
+    control: f64,
+    state_step: [f64; 2],
+    control_step: f64,
+    /// Missing in the transition to the next node.
+    gap: [f64; 2],
+    /// Hessian: 00, 01, 11, 0u, 1u, uu.
+    hessian: [f64; 6],
+    /// Of the cost, x0 only.
+    gradient: f64,
+    /// Value function of the recursion: 00, 01, 11.
+    value: [f64; 3],
+    /// Of the control: its own curvature, and its coupling with the state.
+    control_curvature: f64,
+    control_coupling: [f64; 2],
+    feedback: [f64; 2],
+    feedforward: f64,
+}
+
+/// How an attempt ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// Within the tolerance of the optimum, limits kept.
+    Solved,
+    /// No such point was found.
+    Failed,
+}
+
+/// Memory of the method, used again and again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Solver {
+    nodes: Vec<Node>,
+}
+
+/// Steps after which a problem counts as unsolvable.
+const STEPS_MAX: u32 = 50;
+
+/// How much of the way to the nearest limit a step goes.
+const STEP_SHARE: f64 = 0.99;
+
+/// Slack that a row starts with at least.
+const SLACK_START_MIN: f64 = 0.05;
+
+/// Limits and transitions are met to this.
+const RESIDUAL_MAX: f64 = 1e-11;
+
+/// Steps shorter than this, so many in a row, lead nowhere.
+const STALL_STEP: f64 = 0.2;
+const STALLS_MAX: u32 = 2;
+
+/// What is good enough there.
+const STALLED_GAP_MAX_RATIO: f64 = 0.02;
+const STALLED_RESIDUAL_MAX: f64 = 1e-9;
+
+/// Added to the curvature where nothing else is.
+const CURVATURE_MIN: f64 = 1e-12;
+
+impl Solver {
+    /// State of a node.
+    pub fn state_ratio(&self, node: usize) -> [f64; 2] {
+        self.nodes[node].state
+    }
+
+    /// Starts from these states and the controls after them.
+    pub fn start(&mut self, states_ratio: impl IntoIterator<Item = ([f64; 2], f64)>) {
+        self.nodes.clear();
+        self.nodes.extend(states_ratio.into_iter().map(|(state, control)| Node { state, control, ..Node::default() }));
+    }
+
+    /// The first state, which stays as it is or on its ray.
+    pub fn set_first(&mut self, state_ratio: [f64; 2]) {
+        if let Some(first) = self.nodes.first_mut() {
+            first.state = state_ratio;
+        }
+    }
+
+    /// Solves to a cost within `gap_max_ratio` of the least, absolute.
+    pub fn solve(&mut self, problem: &mut Problem, gap_max_ratio: f64) -> Outcome {
+        if self.nodes.len() != problem.transitions.len() + 1 || problem.rows.is_empty() {
+            return Outcome::Failed;
+        }
+        let count = problem.rows.len() as f64;
+        self.first_slacks(problem, count);
+        let mut stalls = 0;
+        for _ in 0..STEPS_MAX {
+            let (gap, residual) = self.linearise(problem);
+            if !gap.is_finite() {
+                return Outcome::Failed;
+            }
+            if gap <= gap_max_ratio && residual <= RESIDUAL_MAX {
+                return Outcome::Solved;
+            }
+            self.factorise(problem);
+            self.direction(problem, 0.0);
+            let (primal, dual) = longest(&problem.rows);
+            let after: f64 = problem.rows.iter().map(|row| row.product_after(primal, dual)).sum();
+            let centring = (after / gap).powi(3).min(1.0) * gap / count;
+            for row in &mut problem.rows {
+                row.correction = row.slack_step * row.multiplier_step;
+            }
+            self.direction(problem, centring);
+            let (primal, dual) = longest(&problem.rows);
+            let share = STEP_SHARE.max(1.0 - gap);
+            let step = (share * primal.min(dual)).min(1.0);
+            self.advance(problem, step);
+            // Where hardly anything is free the multipliers grow without bound, and the steps vanish: a point that keeps the limits will do.
+            let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= STALLED_RESIDUAL_MAX;
+            stalls = if usable && step < STALL_STEP { stalls + 1 } else { 0 };
+            if stalls >= STALLS_MAX {
+                return Outcome::Solved;
+            }
+        }
+        Outcome::Failed
+    }
+
+    fn first_slacks(&self, problem: &mut Problem, count: f64) {
+        let product = 3.0 * problem.costs_ratio.iter().sum::<f64>() / count;
+        let Problem { rows, ends, .. } = problem;
+        let mut first = 0;
+        for (node, end) in self.nodes.iter().zip(ends.iter()) {
+            for row in &mut rows[first..*end] {
+                let left = row.bound - row.along(&node.state, node.control);
+                row.slack = left.max(SLACK_START_MIN);
+                row.multiplier = product / row.slack;
+                row.correction = 0.0;
+            }
+            first = *end;
+        }
+    }
+
+    /// Residuals, weights and Hessians at the present point: the complementarity gap, and the greatest residual.
+    fn linearise(&mut self, problem: &mut Problem) -> (f64, f64) {
+        let (mut total, mut residual) = (0.0, 0.0_f64);
+        for i in 0..problem.transitions.len() {
+            let (x, u, next) = (self.nodes[i].state, self.nodes[i].control, self.nodes[i + 1].state);
+            let reached = problem.transitions[i].apply(&x, u);
+            let gap = [reached[0] - next[0], reached[1] - next[1]];
+            residual = residual.max(gap[0].abs()).max(gap[1].abs());
+            self.nodes[i].gap = gap;
+        }
+        let Problem { rows, ends, costs_ratio, .. } = problem;
+        let mut first = 0;
+        for ((node, end), cost) in self.nodes.iter_mut().zip(ends.iter()).zip(costs_ratio.iter()) {
+            let b = node.state[0].max(f64::MIN_POSITIVE);
+            let root = b.sqrt();
+            node.gradient = -0.5 * cost / (b * root);
+            let mut h = [0.75 * cost / (b * b * root), 0.0, CURVATURE_MIN, 0.0, 0.0, CURVATURE_MIN];
+            for row in &mut rows[first..*end] {
+                row.residual = row.bound - row.along(&node.state, node.control) - row.slack;
+                residual = residual.max(row.residual.abs());
+                total += row.slack * row.multiplier;
+                row.weight = row.multiplier / row.slack;
+                row.correction = 0.0;
+                let [a0, a1, a2] = row.a;
+                let (w0, w1) = (row.weight * a0, row.weight * a1);
+                let added = [w0 * a0, w0 * a1, w1 * a1, w0 * a2, w1 * a2, row.weight * a2 * a2];
+                h.iter_mut().zip(added).for_each(|(h, added)| *h += added);
+            }
+            node.hessian = h;
+            first = *end;
+        }
+        (total, residual)
+    }
+
+    /// Riccati recursion from the end.
+    fn factorise(&mut self, problem: &Problem) {
+        let count = problem.transitions.len();
+        let h = self.nodes[count].hessian;
+        let mut p = [h[0], h[1], h[2]];
+        self.nodes[count].value = p;
+        for (node, transition) in self.nodes[..count].iter_mut().zip(&problem.transitions).rev() {
+            let [a00, a01, a10, a11] = transition.state_ratio;
+            let [b0, b1] = transition.control_ratio;
+            let h = node.hessian;
+            let pa =
+                [p[0] * a00 + p[1] * a10, p[0] * a01 + p[1] * a11, p[1] * a00 + p[2] * a10, p[1] * a01 + p[2] * a11];
+            let q =
+                [h[0] + a00 * pa[0] + a10 * pa[2], h[1] + a00 * pa[1] + a10 * pa[3], h[2] + a01 * pa[1] + a11 * pa[3]];
+            if transition.has_control() {
+                let pb = [p[0] * b0 + p[1] * b1, p[1] * b0 + p[2] * b1];
+                let curvature = h[5] + b0 * pb[0] + b1 * pb[1];
+                let coupling = [h[3] + b0 * pa[0] + b1 * pa[2], h[4] + b0 * pa[1] + b1 * pa[3]];
+                let k = [-coupling[0] / curvature, -coupling[1] / curvature];
+                (node.control_curvature, node.control_coupling, node.feedback) = (curvature, coupling, k);
+                p = [q[0] + coupling[0] * k[0], q[1] + coupling[0] * k[1], q[2] + coupling[1] * k[1]];
+            } else {
+                (node.control_curvature, node.control_coupling, node.feedback) = (1.0, [0.0; 2], [0.0; 2]);
+                p = q;
+            }
+            node.value = p;
+        }
+    }
+
+    /// Newton's direction for a complementarity product of `centring`.
+    fn direction(&mut self, problem: &mut Problem, centring: f64) {
+        let count = problem.transitions.len();
+        let Problem { rows, ends, transitions, start_ray_ratio, .. } = problem;
+        let mut p = [0.0; 2];
+        for i in (0..=count).rev() {
+            let first = if i == 0 { 0 } else { ends[i - 1] };
+            let mut g = [self.nodes[i].gradient, 0.0, 0.0];
+            for row in &rows[first..ends[i]] {
+                let force = (centring - row.correction) / row.slack - row.weight * row.residual;
+                g.iter_mut().zip(row.a).for_each(|(g, a)| *g += force * a);
+            }
+            if i == count {
+                p = [g[0], g[1]];
+                continue;
+            }
+            let next = self.nodes[i + 1].value;
+            let node = &mut self.nodes[i];
+            let [a00, a01, a10, a11] = transitions[i].state_ratio;
+            let [b0, b1] = transitions[i].control_ratio;
+            let e = node.gap;
+            let v = [p[0] + next[0] * e[0] + next[1] * e[1], p[1] + next[1] * e[0] + next[2] * e[1]];
+            p = [g[0] + a00 * v[0] + a10 * v[1], g[1] + a01 * v[0] + a11 * v[1]];
+            node.feedforward = 0.0;
+            if transitions[i].has_control() {
+                node.feedforward = -(g[2] + b0 * v[0] + b1 * v[1]) / node.control_curvature;
+                p[0] += node.control_coupling[0] * node.feedforward;
+                p[1] += node.control_coupling[1] * node.feedforward;
+            }
+        }
+        let mut dx = start_ray_ratio.map_or([0.0; 2], |ray| along_ray(ray, &self.nodes[0].value, &p));
+        let mut first = 0;
+        for i in 0..=count {
+            let node = &mut self.nodes[i];
+            node.state_step = dx;
+            node.control_step =
+                if i < count { node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward } else { 0.0 };
+            for row in &mut rows[first..ends[i]] {
+                row.slack_step = row.residual - row.along(&dx, node.control_step);
+                row.multiplier_step =
+                    (centring - row.correction) / row.slack - row.multiplier - row.weight * row.slack_step;
+            }
+            first = ends[i];
+            if i < count {
+                let reached = transitions[i].apply(&dx, node.control_step);
+                dx = [reached[0] + node.gap[0], reached[1] + node.gap[1]];
+            }
+        }
+    }
+
+    fn advance(&mut self, problem: &mut Problem, step: f64) {
+        for node in &mut self.nodes {
+            node.state[0] += step * node.state_step[0];
+            node.state[1] += step * node.state_step[1];
+            node.control += step * node.control_step;
+        }
+        for row in &mut problem.rows {
+            row.slack += step * row.slack_step;
+            row.multiplier += step * row.multiplier_step;
+        }
+    }
+}
+
+impl Row {
+    fn along(&self, state: &[f64; 2], control: f64) -> f64 {
+        self.a[0] * state[0] + self.a[1] * state[1] + self.a[2] * control
+    }
+
+    fn product_after(&self, primal: f64, dual: f64) -> f64 {
+        (self.slack + primal.min(1.0) * self.slack_step) * (self.multiplier + dual.min(1.0) * self.multiplier_step)
+    }
+}
+
+impl Transition {
+    fn apply(&self, state: &[f64; 2], control: f64) -> [f64; 2] {
+        let ([a00, a01, a10, a11], [b0, b1]) = (self.state_ratio, self.control_ratio);
+        [a00 * state[0] + a01 * state[1] + b0 * control, a10 * state[0] + a11 * state[1] + b1 * control]
+    }
+
+    fn has_control(&self) -> bool {
+        self.control_ratio != [0.0; 2]
+    }
+}
+
+/// The step along the ray that is best for the value function.
+fn along_ray(ray: [f64; 2], value: &[f64; 3], gradient: &[f64; 2]) -> [f64; 2] {
+    let curvature = value[0] * ray[0] * ray[0] + 2.0 * value[1] * ray[0] * ray[1] + value[2] * ray[1] * ray[1];
+    let step = -(ray[0] * gradient[0] + ray[1] * gradient[1]) / curvature;
+    [ray[0] * step, ray[1] * step]
+}
+
+/// Steps at which the first slack and the first multiplier would vanish.
+fn longest(rows: &[Row]) -> (f64, f64) {
+    let (mut primal, mut dual) = (0.0_f64, 0.0_f64);
+    for row in rows {
+        primal = primal.max(-row.slack_step / row.slack);
+        dual = dual.max(-row.multiplier_step / row.multiplier);
+    }
+    (1.0 / primal.max(f64::MIN_POSITIVE), 1.0 / dual.max(f64::MIN_POSITIVE))
+}
