@@ -95,7 +95,7 @@ fn smooth(path: &JointPath) -> Vec<JointPath> {
             PieceKind::Blend(curve, corner) => PieceKind::Blend(curve.trimmed(range[0], range[1]), *corner),
             waits => waits.clone(),
         };
-        JointPath { contour: ContourPiece { kind, ..contour.clone() } }
+        JointPath { contour: ContourPiece { kind, ..contour.clone() }, ..path.clone() }
     };
     borders.windows(2).map(part).collect()
 }
