@@ -9,7 +9,7 @@ use super::profile::{Profile, Used};
 use super::{NoOptimum, OptimalMotion, Optimum, SpeedPlace, round};
 
 /// Pieces between two rests that are solved at once; more ask for more memory and time than the figure is worth.
-const PIECES_MAX: usize = 20_000;
+const PIECES_MAX: usize = 5000;
 
 /// Rounds end where one gains less than this share of the time. On a refined grid a few are enough: it begins near its optimum.
 const ROUND_GAIN_RATIO: f64 = 1e-4;
