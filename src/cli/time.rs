@@ -134,13 +134,13 @@ fn no_optimum(path: &Path, reason: NoOptimum) -> Diagnostic {
             let message = format!(
                 "{name}: the optimum is found for {pieces_max} pieces of path between two rests at most, and here are {pieces}"
             );
-            Diagnostic::error("P0003", message).help("cut the program into parts that begin and end at rest")
+            Diagnostic::error("P0011", message).help("cut the program into parts that begin and end at rest")
         }
         NoOptimum::NotSolved { line } => {
             let message = format!("{name}: no optimum is found for the motion that begins in line {line}");
-            Diagnostic::error("P0004", message).help("leave out --optimal")
+            Diagnostic::error("P0012", message).help("leave out --optimal")
         }
-        NoOptimum::NotBuilt => Diagnostic::error("P0005", "this `sollwert` was built without `--optimal`")
+        NoOptimum::NotBuilt => Diagnostic::error("P0013", "this `sollwert` was built without `--optimal`")
             .help("build it with the feature `optimal`, which is on by default"),
     }
 }

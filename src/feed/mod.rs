@@ -11,7 +11,10 @@ mod limits;
 mod modes;
 mod planner;
 mod positioning;
+mod printed_arc;
 pub mod profile;
+mod programmed;
+mod published;
 pub mod ramp;
 mod rules;
 mod scan;
@@ -21,5 +24,6 @@ mod wire;
 mod worst;
 
 pub use planner::Planner;
+pub use programmed::ProgrammedTime;
 pub use rules::{AxisCaps, PathRules, PieceRules};
 pub use wire::*;

@@ -15,13 +15,15 @@ use super::limits::{AxisRules, Ends, PieceLimits};
 use super::modes::ModeRules;
 use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
+use super::published::{self, Tally};
 use super::split::{self, Part};
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
 use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
-use crate::machine::{Machine, TimeLawKind};
+use crate::machine::{BlendLaw, Machine, TimeLawKind};
+use crate::program::BlockRef;
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -56,6 +58,10 @@ pub struct Planner {
     cutting_s: f64,
     /// Axes that move on their own.
     arrivals: Arrivals,
+    /// What the printed blend law did.
+    published: Tally,
+    /// Where it came to a stand first, and whether that has been told.
+    stalled: Option<(BlockRef, bool)>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
     /// The law `continuous`; `None` under `seven-phase`.
@@ -126,6 +132,8 @@ impl Planner {
             elapsed_s: 0.0,
             cutting_s: 0.0,
             arrivals: Arrivals::new(),
+            published: Tally::default(),
+            stalled: None,
             half_blend_lu: 0.0,
             continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
         }
@@ -134,6 +142,18 @@ impl Planner {
     /// Time of everything that has been handed out, and of the motions with feed among it.
     pub fn elapsed_s(&self) -> (f64, f64) {
         (self.elapsed_s, self.cutting_s)
+    }
+
+    /// The alarm of the piece handed out last, with its block: the path comes to rest at the end of what was pushed, after
+    /// [`Planner::finish`].
+    pub fn take_alarm(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        let (block, told) = self.stalled.as_mut()?;
+        (!std::mem::replace(told, true)).then(|| (*block, published::stalled(*block)))
+    }
+
+    /// What a person should know about the laws handed out so far, with the block where it began; each once.
+    pub fn take_warning(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        std::mem::take(&mut self.published).warning()
     }
 
     /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken (of a
@@ -242,7 +262,10 @@ impl Planner {
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
             Motion::Flows(_) => (flowing.unwrap_or_default(), STOP),
-            _ => front.fixed(self.entry, ahead, self.setpoint_period_s),
+            _ => match self.printed_law(&front, ahead) {
+                Some(printed) => printed,
+                None => front.fixed(self.entry, ahead, self.setpoint_period_s),
+            },
         };
         self.elapsed_s += law.duration_s();
         if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_)) && front.path.contour.feed != Feed::Rapid {
@@ -260,6 +283,35 @@ impl Planner {
             self.rests -= usize::from(next.rests_before());
         }
         Some(piece)
+    }
+
+    /// The printed law of a blend, where the machine asks for it and it leaves with a speed that the path ahead allows.
+    fn printed_law(&mut self, front: &Entry, ahead: SpeedCap) -> Option<(TimeLaw, SpeedCap)> {
+        let contour = &front.path.contour;
+        let (PieceKind::Blend(Curve::Blend(blend), _), true) = (&contour.kind, front.path.is_contour()) else {
+            return None;
+        };
+        let rules = self.rules.of(&contour.modes);
+        if rules.blend_law != BlendLaw::Published || !rules.jerk_limited || self.stalled.is_some() {
+            return None;
+        }
+        let curve = contour.curve()?;
+        let ahead = if front.rests_after { STOP } else { ahead };
+        match published::crossing(&rules, blend, rules.feed_cap(&contour.feed, curve), self.entry.velocity_lu_s) {
+            Ok(crossing) if crossing.exit_lu_s <= ahead.velocity_lu_s * published::RULE_RATIO => {
+                self.published.crossed(contour.block, &crossing);
+                let exit = SpeedCap { velocity_lu_s: crossing.exit_lu_s, limit: crossing.limit };
+                Some((crossing.law, exit.min(ahead)))
+            }
+            Ok(_) => {
+                self.published.guarded(contour.block);
+                None
+            }
+            Err(published::Stalled) => {
+                self.stalled = Some((contour.block, false));
+                None
+            }
+        }
     }
 
     /// The law of the front piece under `continuous`; `None` where it does not move.
@@ -384,7 +436,7 @@ impl Planner {
             return REST;
         }
         let t_s = self.setpoint_period_s;
-        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
+        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.exit_cap(t_s));
         let inside = piece.motion.highest_entry(if piece.rests_after { REST } else { exit });
         if inside.cap.velocity_lu_s < junction.velocity_lu_s {
             return inside;
@@ -434,6 +486,14 @@ impl Motion {
             Self::Moves { limits, .. } => limits.cap,
             Self::Waits { .. } | Self::WaitsFor { .. } => STOP,
             Self::Flows(_) | Self::Nothing => FREE,
+        }
+    }
+
+    /// Highest speed at its end.
+    fn exit_cap(&self, setpoint_period_s: f64) -> SpeedCap {
+        match self {
+            Self::Moves { limits, block_length_lu: None, .. } => limits.exit_cap,
+            _ => self.cap(setpoint_period_s),
         }
     }
 

@@ -46,7 +46,8 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
             if matches!(curve, Curve::Polynomial(_) | Curve::Quintic(_)) || !path.is_contour() =>
         {
             let scan = scan(rules, &path);
-            let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1)));
+            let path_of = rules.path_limits.then_some(&rules.linear);
+            let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1), path_of));
             return vec![Part { path, worst }];
         }
         _ => return vec![Part { path, worst: None }],
@@ -62,7 +63,7 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
         for stretch in stretches(rules, &smooth, &scan) {
             let places = scan.places();
             let (from_lu, to_lu) = (places[stretch.first].s_lu, places[stretch.last].s_lu);
-            let worst = Some(scan.worst(stretch.first, stretch.last));
+            let worst = Some(scan.worst(stretch.first, stretch.last, None));
             parts.push(Part { path: cut(&smooth, from_lu, to_lu), worst });
         }
     }
@@ -151,7 +152,7 @@ fn stretches(rules: &AxisRules, path: &JointPath, scan: &Scan) -> Vec<Stretch> {
             _ => stretches.push(Stretch { first: i, last: i + 1, speed_lu_s }),
         }
     }
-    let dynamics = PieceLimits::rough_dynamics(rules, &scan.worst(0, last));
+    let dynamics = PieceLimits::rough_dynamics(rules, &scan.worst(0, last, None));
     let way_lu = |from: &Stretch, to: &Stretch| dynamics.ramp_length_lu(from.speed_lu_s, to.speed_lu_s);
     while let Some(tightest) = tightest(&stretches, scan, &way_lu) {
         let gone = stretches.remove(tightest + 1);

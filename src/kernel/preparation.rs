@@ -134,9 +134,17 @@ impl PieceSource for Preparation {
     fn next_piece(&mut self) -> Option<PlannedPiece> {
         loop {
             if let Some(piece) = self.planner.pop() {
+                if let Some((block, alarm)) = self.planner.take_alarm() {
+                    self.alarm = Some(self.smoother.marked(alarm, block));
+                    self.finished = true;
+                    self.planner.finish();
+                }
                 return Some(piece);
             }
             if self.finished {
+                if let Some((block, warning)) = self.planner.take_warning() {
+                    self.warnings.push(self.smoother.marked(warning, block));
+                }
                 return None;
             }
             self.extend();
