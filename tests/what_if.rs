@@ -37,8 +37,8 @@ fn value(machine_name: &str, key: &str) -> Option<f64> {
     at.as_float().or_else(|| at.as_integer().map(|whole| whole as f64))
 }
 
-/// The savings agree with full runs to a few percent of the saving, or to a ten-thousandth of the time.
-fn agrees(program: &ProgramSource, name: &str, sets: &[&str]) -> WhatIf {
+/// The savings agree with full runs to 5 % of the saving, or to `slack_share` of the time.
+fn agrees(program: &ProgramSource, name: &str, sets: &[&str], slack_share: f64) -> WhatIf {
     let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
     let before = machine(name, &sets);
     let costs = what_if(program.clone().into(), &before, &mut |_, _| {});
@@ -62,7 +62,7 @@ fn agrees(program: &ProgramSource, name: &str, sets: &[&str]) -> WhatIf {
             saving.saves_s
         );
         assert!(
-            off_s <= 0.05 * saved_s.abs() + 1e-4 * before_s,
+            off_s <= 0.05 * saved_s.abs() + slack_share * before_s,
             "{}: {} s, full run {saved_s} s",
             saving.key,
             saving.saves_s
@@ -76,18 +76,20 @@ fn agrees(program: &ProgramSource, name: &str, sets: &[&str]) -> WhatIf {
 
 #[test]
 fn savings_of_shipped_programs_are_those_of_full_runs() {
-    let costs = agrees(&shipped_program("corners.mpf"), "spinner_mvc850", &[]);
+    let costs = agrees(&shipped_program("corners.mpf"), "spinner_mvc850", &[], 1e-4);
     assert!(costs.savings[0].saves_s > 0.0, "nothing saves time: {:?}", costs.savings);
-    agrees(&shipped_program("spline.mpf"), "xyzbc", &[]);
-    agrees(&shipped_program("pocket.mpf"), "huron_kx10", &[]);
+    agrees(&shipped_program("spline.mpf"), "xyzbc", &[], 1e-4);
+    agrees(&shipped_program("pocket.mpf"), "huron_kx10", &[], 1e-4);
     // Each full run is a tenth of a datum's +10 %; 50 of them is what a person would have to do.
-    let costs = agrees(&shipped_program("pocket.mpf"), "spinner_mvc850", &[]);
+    let costs = agrees(&shipped_program("pocket.mpf"), "spinner_mvc850", &[], 1e-4);
     assert!(costs.moves_planned_again < 50 * costs.moves / 2, "{} of {} moves", costs.moves_planned_again, costs.moves);
 }
 
 #[test]
 fn savings_under_the_continuous_law_are_those_of_full_runs() {
-    agrees(&shipped_program("spline.mpf"), "spinner_mvc850", &["feed.time_law=continuous", "smoothing.shape=quintic"]);
+    // A plan of this law is good to a few ten-thousandths: it ends in a stop which is then planned again.
+    let sets = ["feed.time_law=continuous", "smoothing.shape=quintic"];
+    agrees(&shipped_program("spline.mpf"), "spinner_mvc850", &sets, 5e-4);
 }
 
 /// A long path at F with a corner now and then.
@@ -110,8 +112,9 @@ fn mostly_straight(corners: u32, straight: u32) -> ProgramSource {
 
 #[test]
 fn only_the_places_concerned_are_planned_again() {
-    let program = mostly_straight(8, 400);
-    let costs = agrees(&program, "spinner_mvc850", &[]);
+    let program = mostly_straight(4, 2000);
+    // With 8 blocks of look-ahead a path of 2 mm blocks never reaches F.
+    let costs = agrees(&program, "spinner_mvc850", &["look_ahead.blocks=100"], 1e-4);
     let full_runs = costs.moves_planned_again as f64 / costs.moves as f64;
     eprintln!("{} data, {} moves, {full_runs:.2} times the program planned again", costs.savings.len(), costs.moves);
     assert!(full_runs < 5.0, "{full_runs} full runs");
@@ -121,12 +124,12 @@ fn only_the_places_concerned_are_planned_again() {
         .iter()
         .find(|saving| saving.key != "F" && saving.saves_s > 0.0)
         .expect("an axis binds at the corners");
-    // F from 100 to 110 mm/s over 6.4 m.
-    let expected_s = 6400.0 / 100.0 - 6400.0 / 110.0;
+    // F from 100 to 110 mm/s over 16 m.
+    let expected_s = 16_000.0 / 100.0 - 16_000.0 / 110.0;
     assert!((feed.saves_s / expected_s - 1.0).abs() < 0.05, "{} s, about {expected_s} s", feed.saves_s);
-    // A corner is in every 400th line: the lines named are near one of them, or at an end of the path.
+    // A corner is in every 2000th line: the lines named are near one of them, or at an end of the path.
     for (line, _) in &jerk.lines {
-        let nearest = (0..=8).map(|corner| (i64::from(*line) - 2 - 400 * corner).abs()).min().expect("corners");
+        let nearest = (0..=4).map(|corner| (i64::from(*line) - 2 - 2000 * corner).abs()).min().expect("corners");
         assert!(nearest <= 12, "line {line} is {nearest} lines from a corner");
     }
 }

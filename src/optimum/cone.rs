@@ -22,19 +22,19 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    pub fn new(columns: usize) -> Self {
+    pub(super) fn new(columns: usize) -> Self {
         Self { columns, linear: vec![0.0; columns], ..Self::default() }
     }
 
     /// a x = b. All of these come before any of the others.
-    pub fn equal(&mut self, row: &[(usize, f64)], right: f64) {
+    pub(super) fn equal(&mut self, row: &[(usize, f64)], right: f64) {
         debug_assert_eq!(self.equalities, self.right.len());
         self.at_most(row, right);
         self.equalities += 1;
     }
 
     /// a x <= b.
-    pub fn at_most(&mut self, row: &[(usize, f64)], right: f64) {
+    pub(super) fn at_most(&mut self, row: &[(usize, f64)], right: f64) {
         let index = self.right.len();
         for (column, value) in row.iter().filter(|(_, value)| *value != 0.0) {
             self.entries.0.push(index);
@@ -45,7 +45,7 @@ impl Problem {
     }
 
     /// Adds `linear a x + square (a x)² / 2` to the cost.
-    pub fn cost(&mut self, row: &[(usize, f64)], linear: f64, square: f64) {
+    pub(super) fn cost(&mut self, row: &[(usize, f64)], linear: f64, square: f64) {
         for (i, (column, value)) in row.iter().enumerate() {
             self.linear[*column] += linear * value;
             for (other, factor) in &row[i..] {
@@ -58,7 +58,7 @@ impl Problem {
     }
 
     /// The least cost; `None` if the method finds none.
-    pub fn solve(self) -> Option<Vec<f64>> {
+    pub(super) fn solve(self) -> Option<Vec<f64>> {
         let rows = self.right.len();
         let cost =
             CscMatrix::new_from_triplets(self.columns, self.columns, self.squares.0, self.squares.1, self.squares.2);

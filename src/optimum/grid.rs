@@ -79,17 +79,17 @@ pub(super) struct RestWay {
 
 impl RestWay {
     /// Time on the way if b is `square` at its end: ∫ ds/√(c s^e) = 2 / (2 - e) · s/√b.
-    pub fn time_s(&self, square: f64) -> f64 {
+    pub(super) fn time_s(&self, square: f64) -> f64 {
         self.weight() / square.sqrt()
     }
 
-    pub fn weight(&self) -> f64 {
+    pub(super) fn weight(&self) -> f64 {
         2.0 / (2.0 - self.exponent_ratio) * self.length_lu
     }
 }
 
 impl PathPoint {
-    pub fn new(state: &JointState, rules: &PieceRules) -> Self {
+    pub(super) fn new(state: &JointState, rules: &PieceRules) -> Self {
         let mut square_max = rules.feed_lu_s.map_or(f64::INFINITY, |feed_lu_s| feed_lu_s * feed_lu_s);
         let (mut accelerations, mut jerks) = (Vec::new(), Vec::new());
         let mut steepest: [Option<[f64; 3]>; 2] = [None; 2];
@@ -121,12 +121,12 @@ impl PathPoint {
     }
 
     /// Largest share of an acceleration limit that is used.
-    pub fn acceleration_ratio(&self, square: f64, slope: f64) -> f64 {
+    pub(super) fn acceleration_ratio(&self, square: f64, slope: f64) -> f64 {
         self.accelerations.iter().map(|[d1, d2]| (d2 * square + d1 * slope / 2.0).abs()).fold(0.0, f64::max)
     }
 
     /// Largest share of a jerk limit that is used.
-    pub fn jerk_ratio(&self, square: f64, slope: f64, bend: f64) -> f64 {
+    pub(super) fn jerk_ratio(&self, square: f64, slope: f64, bend: f64) -> f64 {
         let of = |[d1, d2, d3]: &[f64; 3]| (d3 * square + 1.5 * d2 * slope + 0.5 * d1 * bend).abs();
         square.max(0.0).sqrt() * self.jerks.iter().map(of).fold(0.0, f64::max)
     }
@@ -134,7 +134,7 @@ impl PathPoint {
 
 impl Grid {
     /// The first grid of a motion.
-    pub fn new(pieces: &[Piece]) -> Self {
+    pub(super) fn new(pieces: &[Piece]) -> Self {
         let whole_lu: f64 = pieces.iter().map(|piece| piece.length_lu).sum();
         let rests = [rest_way(pieces, whole_lu, true), rest_way(pieces, whole_lu, false)];
         let end_lu = whole_lu - rests[1].length_lu;
@@ -194,7 +194,7 @@ impl Grid {
     }
 
     /// The same with some intervals cut in two.
-    pub fn refined(&self, pieces: &[Piece], cut: &[bool]) -> Self {
+    pub(super) fn refined(&self, pieces: &[Piece], cut: &[bool]) -> Self {
         let mut intervals = Vec::with_capacity(2 * self.intervals.len());
         for (interval, cut) in self.intervals.iter().zip(cut) {
             if !*cut {
@@ -221,7 +221,7 @@ impl Interval {
 }
 
 impl Piece {
-    pub fn point(&self, s_lu: f64) -> PathPoint {
+    pub(super) fn point(&self, s_lu: f64) -> PathPoint {
         PathPoint::new(&self.path.at(s_lu), &self.rules)
     }
 }

@@ -47,7 +47,7 @@ pub(super) struct Used {
 }
 
 impl Used {
-    pub fn at(point: &PathPoint, [square, slope, bend]: [f64; 3]) -> Self {
+    pub(super) fn at(point: &PathPoint, [square, slope, bend]: [f64; 3]) -> Self {
         Self {
             velocity_ratio: (square.max(0.0) / point.square_max).sqrt(),
             acceleration_ratio: point.acceleration_ratio(square, slope),
@@ -55,7 +55,7 @@ impl Used {
         }
     }
 
-    pub fn most(self, other: Self) -> Self {
+    pub(super) fn most(self, other: Self) -> Self {
         Self {
             velocity_ratio: self.velocity_ratio.max(other.velocity_ratio),
             acceleration_ratio: self.acceleration_ratio.max(other.acceleration_ratio),
@@ -64,39 +64,39 @@ impl Used {
     }
 
     /// By how much time has to be stretched so that all limits hold.
-    pub fn stretch_ratio(self) -> f64 {
+    pub(super) fn stretch_ratio(self) -> f64 {
         self.velocity_ratio.max(self.acceleration_ratio.sqrt()).max(self.jerk_ratio.cbrt()).max(1.0)
     }
 
     /// Largest share.
-    pub fn largest(self) -> f64 {
+    pub(super) fn largest(self) -> f64 {
         self.velocity_ratio.powi(2).max(self.acceleration_ratio).max(self.jerk_ratio)
     }
 }
 
 impl Profile {
     /// b, b' and b'' at a share of an interval.
-    pub fn at(&self, grid: &Grid, index: usize, ratio: f64) -> [f64; 3] {
+    pub(super) fn at(&self, grid: &Grid, index: usize, ratio: f64) -> [f64; 3] {
         let nodes = [self.squares[index], self.slopes[index], self.squares[index + 1], self.slopes[index + 1]];
         weights(ratio, grid.intervals[index].length_lu).map(|row| row.iter().zip(nodes).map(|(w, x)| w * x).sum())
     }
 
     /// Time of an interval.
-    pub fn interval_s(&self, grid: &Grid, index: usize) -> f64 {
+    pub(super) fn interval_s(&self, grid: &Grid, index: usize) -> f64 {
         let least = SQUARE_MIN_RATIO * self.squares[index].max(self.squares[index + 1]);
         let rate = |ratio: f64| 1.0 / self.at(grid, index, ratio)[0].max(least).sqrt();
         grid.intervals[index].length_lu * GAUSS.iter().map(|(ratio, weight)| weight * rate(*ratio)).sum::<f64>()
     }
 
     /// Time of the whole motion.
-    pub fn time_s(&self, grid: &Grid) -> f64 {
+    pub(super) fn time_s(&self, grid: &Grid) -> f64 {
         let last = self.squares.len() - 1;
         let inside_s: f64 = (0..grid.intervals.len()).map(|i| self.interval_s(grid, i)).sum();
         grid.rests[0].time_s(self.squares[0]) + inside_s + grid.rests[1].time_s(self.squares[last])
     }
 
     /// Limits used at some places of an interval, its ends included.
-    pub fn used(&self, grid: &Grid, pieces: &[Piece], index: usize, places: usize) -> Used {
+    pub(super) fn used(&self, grid: &Grid, pieces: &[Piece], index: usize, places: usize) -> Used {
         let Interval { piece, from_lu, length_lu, .. } = &grid.intervals[index];
         let look = |i: usize| {
             let ratio = i as f64 / places as f64;
@@ -106,7 +106,7 @@ impl Profile {
     }
 
     /// The same motion on a grid with intervals cut in two.
-    pub fn refined(&self, grid: &Grid, cut: &[bool]) -> Self {
+    pub(super) fn refined(&self, grid: &Grid, cut: &[bool]) -> Self {
         let (mut squares, mut slopes) = (vec![self.squares[0]], vec![self.slopes[0]]);
         for (i, cut) in cut.iter().enumerate() {
             if *cut {

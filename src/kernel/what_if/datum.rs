@@ -4,6 +4,7 @@
 
 use crate::base::{AxisId, AxisKind};
 use crate::feed::{Limit, LimitKind, PlannedPiece};
+use crate::geometry::Curve;
 use crate::interpreter::{Feed, Move};
 use crate::machine::{AxisLimits, CornerRule, DynamicsMode, Machine, tables};
 use crate::smoothing::PieceKind;
@@ -53,15 +54,28 @@ pub(super) fn behind(machine: &Machine, piece: &PlannedPiece, limit: Limit) -> V
     let contour = &piece.path.contour;
     let blend = matches!(contour.kind, PieceKind::Blend(..));
     let of = |what: AxisDatum| {
-        limit.axis.map(|axis| Datum::Axis { axis, set: set_of(machine, axis, contour.modes.dynamics), what })
+        limit.axis.map(|axis| {
+            let set = set_of(machine, axis, contour.modes.dynamics);
+            // A transition jerk that is not given is the jerk.
+            let limits = limits_of(machine, axis, set);
+            let given = limits.transition_jerk_max_lu_s3 != limits.jerk_max_lu_s3;
+            let what = if what == AxisDatum::TransitionJerk && !given { AxisDatum::Jerk } else { what };
+            Datum::Axis { axis, set, what }
+        })
     };
     let jerk = if blend { AxisDatum::TransitionJerk } else { AxisDatum::Jerk };
+    let bends = matches!(limit.kind, LimitKind::RadialAcceleration | LimitKind::RadialJerk);
+    // On a line it is a neighbour that bends, and may be a blend.
+    let blend = blend || bends && matches!(contour.curve(), Some(Curve::Line(_)));
     let mut data: Vec<Option<Datum>> = match limit.kind {
         LimitKind::Feed => vec![Some(Datum::ProgrammedFeed)],
         LimitKind::Velocity => vec![of(AxisDatum::Velocity)],
         LimitKind::Acceleration => vec![of(AxisDatum::Acceleration)],
         LimitKind::Jerk => vec![of(jerk)],
         LimitKind::RadialAcceleration => vec![of(AxisDatum::Acceleration), Some(Datum::RadialAcceleration)],
+        LimitKind::RadialJerk if blend && jerk == AxisDatum::Jerk => {
+            vec![of(jerk), of(AxisDatum::TransitionJerk), Some(Datum::RadialJerk)]
+        }
         LimitKind::RadialJerk => vec![of(jerk), Some(Datum::RadialJerk)],
         LimitKind::TransitionJerk => vec![of(AxisDatum::TransitionJerk)],
         LimitKind::Corner => match machine.feed.corner_rule {
@@ -78,7 +92,27 @@ pub(super) fn behind(machine: &Machine, piece: &PlannedPiece, limit: Limit) -> V
     if blend && limit.kind != LimitKind::Feed && contour.modes.contour_tolerance_mm.is_none() {
         data.push(Some(Datum::ContourTolerance));
     }
-    data.into_iter().flatten().collect()
+    let mut data: Vec<Datum> = data.into_iter().flatten().collect();
+    data.dedup();
+    data
+}
+
+/// Data that matter on a piece beside those behind its limit: what is left for changing the speed inside a blend depends on the transition jerk of
+/// every axis that bends.
+pub(super) fn beside(machine: &Machine, piece: &PlannedPiece) -> Vec<Datum> {
+    let contour = &piece.path.contour;
+    if !matches!(contour.kind, PieceKind::Blend(..)) {
+        return Vec::new();
+    }
+    let ends = [piece.path.at(0.0), piece.path.at(piece.path.length_lu())];
+    let bends = |axis: &AxisId| ends[0].first[*axis] != ends[1].first[*axis];
+    let datum = |axis: AxisId| {
+        let set = set_of(machine, axis, contour.modes.dynamics);
+        let limits = limits_of(machine, axis, set);
+        let given = limits.transition_jerk_max_lu_s3 != limits.jerk_max_lu_s3;
+        Datum::Axis { axis, set, what: if given { AxisDatum::TransitionJerk } else { AxisDatum::Jerk } }
+    };
+    machine.axis_ids().filter(bends).map(datum).collect()
 }
 
 /// The dynamics set whose limits hold, if it has its own.
@@ -88,6 +122,11 @@ fn set_of(machine: &Machine, axis: AxisId, mode: DynamicsMode) -> Option<Dynamic
     // DYNPREC without a set of its own is DYNFINISH.
     let borrowed = mode == DynamicsMode::Precision && sets.get(DynamicsMode::Finish) == Some(own);
     Some(if borrowed { DynamicsMode::Finish } else { mode })
+}
+
+fn limits_of(machine: &Machine, axis: AxisId, set: Option<DynamicsMode>) -> AxisLimits {
+    let axis = machine.axis(axis);
+    *set.and_then(|set| axis.dynamics.get(set)).unwrap_or(&axis.limits)
 }
 
 impl Datum {
@@ -173,14 +212,12 @@ impl Datum {
         };
         let changed = match self {
             Self::Axis { axis, set, what } => {
+                let mut limits = limits_of(machine, axis, set);
+                what.raise(&mut limits);
                 let axis = &mut raised.axes[axis.index()];
                 match set {
-                    None => what.raise(&mut axis.limits),
-                    Some(set) => {
-                        let mut limits = *axis.dynamics.get(set).unwrap_or(&axis.limits);
-                        what.raise(&mut limits);
-                        axis.dynamics.set(set, limits);
-                    }
+                    None => axis.limits = limits,
+                    Some(set) => axis.dynamics.set(set, limits),
                 }
                 percent(RAISED_RATIO)
             }

@@ -16,7 +16,7 @@ use crate::interpreter::{Move, MoveKind, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
 use crate::smoothing::{ContourPiece, Smoother};
-use datum::{Datum, behind};
+use datum::{Datum, behind, beside};
 use places::{Stretch, Timing};
 
 /// Moves that are kept, some hundred bytes each.
@@ -67,7 +67,7 @@ pub struct Saving {
 #[derive(Clone, Debug)]
 struct Binding {
     datum: Datum,
-    /// Moves in order, with the time.
+    /// Moves in order, with the time; 0 where the datum matters and is not the limit that holds.
     moves: Vec<(usize, f64)>,
 }
 
@@ -133,6 +133,9 @@ impl<'a> Run<'a> {
             times_s[at] += piece.law.duration_s();
             run.timing.rests_after[at] |=
                 contour.stop_at_end || contour.curve().is_none() && piece.law.duration_s() > 0.0;
+            for datum in beside(machine, &piece) {
+                bind(&mut run.bindings, datum, at, 0.0);
+            }
             for phase in piece.law.phases() {
                 for datum in behind(machine, &piece, phase.limit) {
                     bind(&mut run.bindings, datum, at, phase.duration_s);
@@ -235,7 +238,7 @@ impl<'a> Run<'a> {
         let mut lines: Vec<(u32, f64)> = Vec::new();
         let mut all: Vec<(u32, f64)> = moves
             .iter()
-            .filter(|(index, _)| Some(self.moves[*index].block.program) == main)
+            .filter(|(index, time_s)| *time_s > 0.0 && Some(self.moves[*index].block.program) == main)
             .map(|(index, time_s)| (self.moves[*index].block.line, *time_s))
             .collect();
         all.sort_by(|a, b| a.0.cmp(&b.0));
