@@ -72,6 +72,11 @@ impl PolynomialCurve {
         self.length_lu
     }
 
+    /// What the arc length of the whole may be off by, rounding apart.
+    pub fn length_error_max_lu(&self) -> f64 {
+        self.table.error_max_lu()
+    }
+
     /// True where no linear axis moves: lengths are then in rad.
     pub fn rotary_only(&self) -> bool {
         self.table.rotary_only()

@@ -59,13 +59,13 @@ pub(super) struct Profile {
 }
 
 /// Solutions within this share of the time are one.
-const GAP_MAX_RATIO: f64 = 5e-5;
+const GAP_MAX_RATIO: f64 = 2e-4;
 
-/// Rounds of tangents: the second is the last in which the time falls by more than a few thousandths.
+/// Rounds of tangents.
 const ROUNDS_MAX: u32 = 3;
 
-/// A round that saves less than this share of the time is the last.
-const SAVING_MIN_SHARE: f64 = 2e-3;
+/// Where b is by no more than this away from its estimate the tangent is good enough: it misses 3/8 of the square of it.
+const STRAY_MAX_SHARE: f64 = 0.12;
 
 /// Attempts with tighter limits where those between the places do not hold.
 const ATTEMPTS_MAX: u32 = 6;
@@ -124,17 +124,13 @@ impl Planning {
         if range.is_empty() || !self.prepare(chain, start, hint) {
             return None;
         }
-        let mut time_before = f64::INFINITY;
         let mut attempts = 0;
         for round in 0.. {
             if !self.solve(chain, start, &range) {
                 return None;
             }
             let profile = self.profile(chain, start);
-            let time_s = profile.time_s(chain);
-            let saved = time_s < (1.0 - SAVING_MIN_SHARE) * time_before;
-            if saved && round + 1 < ROUNDS_MAX {
-                time_before = time_s;
+            if round + 1 < ROUNDS_MAX && self.strays(&profile, &range) {
                 self.take_estimate(&profile, &range);
                 continue;
             }
@@ -200,6 +196,15 @@ impl Planning {
         for (estimate, point) in self.estimate.iter_mut().zip(&profile.points[range.start..=range.end]) {
             *estimate = point.speed_squared_lu2_s2;
         }
+    }
+
+    /// Anywhere the solution is far from where the tangents were laid.
+    fn strays(&self, profile: &Profile, range: &std::ops::Range<usize>) -> bool {
+        let points = &profile.points[range.start..=range.end];
+        let far = |(estimate, point): (&f64, &PathPoint)| {
+            (point.speed_squared_lu2_s2 / estimate - 1.0).abs() > STRAY_MAX_SHARE
+        };
+        self.estimate.iter().zip(points).any(far)
     }
 
     /// The linear problem around the estimate.
@@ -268,10 +273,10 @@ impl Planning {
             let (low, high) = (k.saturating_sub(1), (k + 1).min(count));
             (estimate[high] - estimate[low]) / (low..high).map(length_lu).sum::<f64>()
         };
+        // Without bends: what is missing in the transitions does less harm than a wild bend where the grid is fine.
         let states = (0..=count).map(|k| {
             let scale = Scale::new(estimate[k], length_lu(k.min(count - 1)));
-            let bend = if k + 1 < count { (slope(k + 1) - slope(k)) / length_lu(k) } else { 0.0 };
-            ([START_RATIO, START_RATIO * slope(k) / scale.slope], START_RATIO * bend / scale.bend)
+            ([START_RATIO, START_RATIO * slope(k) / scale.slope], 0.0)
         });
         self.solver.start(states);
     }
@@ -423,7 +428,8 @@ impl NodeRows<'_> {
         for bound in &interval.bounds.axes {
             let Some(jerk) = bound.jerk_lu_s3 else { continue };
             let axis = bound.axis;
-            for (place, estimate) in [(0, estimates[0]), (2, estimates[1])] {
+            let middle = 0.5 * (estimates[0] + estimates[1]);
+            for (place, estimate) in [(0, estimates[0]), (1, middle), (2, estimates[1])] {
                 let state = &interval.states[place];
                 let limit = interval.reserve_ratio * jerk / estimate.sqrt();
                 let (b, slope, bend) =
@@ -431,14 +437,11 @@ impl NodeRows<'_> {
                 if b == 0.0 && slope == 0.0 && bend == 0.0 {
                     continue;
                 }
+                let x = 0.5 * place as f64 * h;
                 let tangent = 0.5 / estimate;
                 for sign in [1.0, -1.0] {
                     let (b, slope, bend) = (sign * b + tangent, sign * slope, sign * bend);
-                    if place == 0 {
-                        self.push([b, slope, bend], 1.5);
-                    } else {
-                        self.push([b, b * h + slope, 0.5 * b * h * h + slope * h + bend], 1.5);
-                    }
+                    self.push([b, b * x + slope, 0.5 * b * x * x + slope * x + bend], 1.5);
                 }
             }
         }
@@ -520,17 +523,6 @@ impl Profile {
         let x = share * chain.intervals[index].length_lu();
         let b = point.speed_squared_lu2_s2 + x * (point.slope_lu_s2 + 0.5 * x * bend);
         (PathPoint { speed_squared_lu2_s2: b, slope_lu_s2: point.slope_lu_s2 + x * bend }, bend)
-    }
-
-    /// Time of all intervals, about: a measure of progress.
-    fn time_s(&self, chain: &Chain) -> f64 {
-        let pairs = self.points.windows(2).zip(&chain.intervals);
-        pairs
-            .map(|(pair, interval)| {
-                let sum = pair[0].speed_squared_lu2_s2.max(0.0).sqrt() + pair[1].speed_squared_lu2_s2.max(0.0).sqrt();
-                2.0 * interval.length_lu() / sum
-            })
-            .sum()
     }
 
     /// What holds the speed in an interval, and how far its limit is used at the middle; of the ends what is used most there.

@@ -17,7 +17,7 @@ use crate::machine::AxisLimits;
 use std::sync::Arc;
 
 /// What the mean of the ends of an interval may miss of its middle, of the greatest demand.
-const MISSED_RATIO: f64 = 0.05;
+const MISSED_RATIO: f64 = 0.07;
 
 /// A demand that would hold the speed to this many times the one that is held for other reasons does not bind.
 const UNBOUND_RATIO: f64 = 1.2;
@@ -27,11 +27,17 @@ const STEP_SHARE: f64 = 0.25;
 const STEP_MIN_S: f64 = 5e-4;
 const STEP_MAX_S: f64 = 0.02;
 
+/// Within an interval the speed grows by this factor at most.
+const FASTER_MAX_RATIO: f64 = 2.0;
+
 /// Away from the ends of a piece an interval takes at most this share of the time to the nearer end.
 const GROWTH_SHARE: f64 = 0.3;
 
 /// The middle alone says too little about a polynomial.
 const POLYNOMIAL_CUTS: u32 = 1;
+
+/// Where a piece is looked at for its slow places.
+const SLOW_PLACES_SHARE: [f64; 3] = [0.3, 0.5, 0.7];
 
 /// Cuts of an interval at most, and intervals of a piece beyond which it stays coarse.
 const CUTS_MAX: u32 = 40;
@@ -45,7 +51,7 @@ const BESIDE_RATIO: f64 = 1e-9;
 
 /// Share of the limits that planning uses: what lies between the places of a curve may take the rest.
 const LINE_RESERVE_RATIO: f64 = 0.998;
-const CURVE_RESERVE_RATIO: f64 = 0.988;
+const CURVE_RESERVE_RATIO: f64 = 0.992;
 
 /// An axis below this share of the greatest demands of all never comes near its limits.
 const IDLE_SHARE: f64 = 1e-3;
@@ -207,6 +213,28 @@ pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &D
     speed_lu_s
 }
 
+/// About the highest speeds at both ends of a piece: from its slow places on they grow with constant jerk.
+pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
+    let length_lu = path.length_lu();
+    let state_at = |s_lu: f64| Derivatives::from(path.at(s_lu));
+    let speed_at = |s_lu: f64| constant_speed_lu_s(rules, path, &state_at(s_lu));
+    if path.is_straight() {
+        return [speed_at(0.0); 2];
+    }
+    let mut ends_lu_s = [speed_at(0.0), speed_at(length_lu)];
+    let start = state_at(0.0);
+    let jerk = rules.largest(|axis, limits| start.first[axis].abs() / limits.jerk_max_lu_s3);
+    let jerk_lu_s3 = if rules.jerk_limited { 1.0 / jerk.demand_ratio } else { f64::INFINITY };
+    for share in SLOW_PLACES_SHARE {
+        let s_lu = share * length_lu;
+        let speed_lu_s = speed_at(s_lu);
+        for (end_lu_s, distance_lu) in ends_lu_s.iter_mut().zip([s_lu, length_lu - s_lu]) {
+            *end_lu_s = end_lu_s.min(speed_lu_s + 0.5 * jerk_lu_s3 * (6.0 * distance_lu / jerk_lu_s3).cbrt().powi(2));
+        }
+    }
+    ends_lu_s
+}
+
 fn cap(rules: &AxisRules, path: &JointPath, states: &[&Derivatives]) -> SpeedCap {
     let share = |axis: AxisId| states.iter().fold(0.0_f64, |most, state| most.max(state.first[axis].abs()));
     match path.contour.curve() {
@@ -341,10 +369,16 @@ impl<'a> Cutter<'a> {
         let held_lu_s = constant_speed_lu_s(self.rules, self.path, middle);
         let distances = [middle_lu, self.length_lu - middle_lu];
         let mut speed_lu_s = held_lu_s;
+        let half_lu = 0.5 * (end_lu - start_lu);
         let mut near_s = f64::INFINITY;
         let mut ramp_s = 0.0_f64;
         for (end, distance_lu) in self.ends.iter().zip(distances) {
             let reached_lu_s = self.reached_lu_s(*end, distance_lu);
+            let nearer_lu_s = self.reached_lu_s(*end, distance_lu - half_lu);
+            let further_lu_s = self.reached_lu_s(*end, distance_lu + half_lu).min(held_lu_s);
+            if further_lu_s > FASTER_MAX_RATIO * nearer_lu_s {
+                return false;
+            }
             speed_lu_s = speed_lu_s.min(reached_lu_s);
             near_s = near_s.min(distance_lu / held_lu_s);
             let from_lu_s = if let End::Speed(v) = end { v.min(held_lu_s) } else { 0.0 };

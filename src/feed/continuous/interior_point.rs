@@ -19,6 +19,8 @@ struct Row {
     bound: f64,
     slack: f64,
     multiplier: f64,
+    /// 1/slack and multiplier/slack at the present point.
+    inverse: f64,
     weight: f64,
     residual: f64,
     slack_step: f64,
@@ -66,6 +68,7 @@ impl Problem {
             bound: bound_ratio,
             slack: 0.0,
             multiplier: 0.0,
+            inverse: 0.0,
             weight: 0.0,
             residual: 0.0,
             slack_step: 0.0,
@@ -131,7 +134,7 @@ pub(super) struct Solver {
 }
 
 /// Steps after which a problem counts as unsolvable.
-const STEPS_MAX: u32 = 50;
+const STEPS_MAX: u32 = 80;
 
 /// How much of the way to the nearest limit a step goes.
 const STEP_SHARE: f64 = 0.99;
@@ -140,7 +143,7 @@ const STEP_SHARE: f64 = 0.99;
 const SLACK_START_MIN: f64 = 0.05;
 
 /// Limits and transitions are met to this.
-const RESIDUAL_MAX: f64 = 1e-11;
+const RESIDUAL_MAX: f64 = 1e-10;
 
 /// Steps shorter than this, so many in a row, lead nowhere.
 const STALL_STEP: f64 = 0.2;
@@ -180,7 +183,11 @@ impl Solver {
         let count = problem.rows.len() as f64;
         self.first_slacks(problem, count);
         let mut stalls = 0;
-        for _ in 0..STEPS_MAX {
+        let debug = std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "2");
+        if debug {
+            eprintln!("new {} {}", self.nodes.len(), problem.rows.len());
+        }
+        for it in 0..STEPS_MAX {
             let (gap, residual) = self.linearise(problem);
             if !gap.is_finite() {
                 return Outcome::Failed;
@@ -189,18 +196,19 @@ impl Solver {
                 return Outcome::Solved;
             }
             self.factorise(problem);
-            self.direction(problem, 0.0);
-            let (primal, dual) = longest(&problem.rows);
+            let (primal, dual) = self.direction(problem, 0.0);
             let after: f64 = problem.rows.iter().map(|row| row.product_after(primal, dual)).sum();
             let centring = (after / gap).powi(3).min(1.0) * gap / count;
             for row in &mut problem.rows {
                 row.correction = row.slack_step * row.multiplier_step;
             }
-            self.direction(problem, centring);
-            let (primal, dual) = longest(&problem.rows);
+            let (primal, dual) = self.direction(problem, centring);
             let share = STEP_SHARE.max(1.0 - gap);
             let step = (share * primal.min(dual)).min(1.0);
             self.advance(problem, step);
+            if debug {
+                eprintln!("  it {it} gap {gap:.3e} res {residual:.3e} step {step:.3e} p {primal:.2e} d {dual:.2e}");
+            }
             // Where hardly anything is free the multipliers grow without bound, and the steps vanish: a point that keeps the limits will do.
             let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= STALLED_RESIDUAL_MAX;
             stalls = if usable && step < STALL_STEP { stalls + 1 } else { 0 };
@@ -247,7 +255,8 @@ impl Solver {
                 row.residual = row.bound - row.along(&node.state, node.control) - row.slack;
                 residual = residual.max(row.residual.abs());
                 total += row.slack * row.multiplier;
-                row.weight = row.multiplier / row.slack;
+                row.inverse = 1.0 / row.slack;
+                row.weight = row.multiplier * row.inverse;
                 row.correction = 0.0;
                 let [a0, a1, a2] = row.a;
                 let (w0, w1) = (row.weight * a0, row.weight * a1);
@@ -289,8 +298,8 @@ impl Solver {
         }
     }
 
-    /// Newton's direction for a complementarity product of `centring`.
-    fn direction(&mut self, problem: &mut Problem, centring: f64) {
+    /// Newton's direction for a complementarity product of `centring`; the steps at which the first slack and the first multiplier would vanish.
+    fn direction(&mut self, problem: &mut Problem, centring: f64) -> (f64, f64) {
         let count = problem.transitions.len();
         let Problem { rows, ends, transitions, start_ray_ratio, .. } = problem;
         let mut p = [0.0; 2];
@@ -298,7 +307,7 @@ impl Solver {
             let first = if i == 0 { 0 } else { ends[i - 1] };
             let mut g = [self.nodes[i].gradient, 0.0, 0.0];
             for row in &rows[first..ends[i]] {
-                let force = (centring - row.correction) / row.slack - row.weight * row.residual;
+                let force = (centring - row.correction) * row.inverse - row.weight * row.residual;
                 g.iter_mut().zip(row.a).for_each(|(g, a)| *g += force * a);
             }
             if i == count {
@@ -320,6 +329,7 @@ impl Solver {
             }
         }
         let mut dx = start_ray_ratio.map_or([0.0; 2], |ray| along_ray(ray, &self.nodes[0].value, &p));
+        let (mut primal, mut dual) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
         let mut first = 0;
         for i in 0..=count {
             let node = &mut self.nodes[i];
@@ -329,7 +339,9 @@ impl Solver {
             for row in &mut rows[first..ends[i]] {
                 row.slack_step = row.residual - row.along(&dx, node.control_step);
                 row.multiplier_step =
-                    (centring - row.correction) / row.slack - row.multiplier - row.weight * row.slack_step;
+                    (centring - row.correction) * row.inverse - row.multiplier - row.weight * row.slack_step;
+                primal = primal.max(-row.slack_step * row.inverse);
+                dual = dual.max(-row.multiplier_step / row.multiplier);
             }
             first = ends[i];
             if i < count {
@@ -337,6 +349,7 @@ impl Solver {
                 dx = [reached[0] + node.gap[0], reached[1] + node.gap[1]];
             }
         }
+        (1.0 / primal, 1.0 / dual)
     }
 
     fn advance(&mut self, problem: &mut Problem, step: f64) {
@@ -378,14 +391,4 @@ fn along_ray(ray: [f64; 2], value: &[f64; 3], gradient: &[f64; 2]) -> [f64; 2] {
     let curvature = value[0] * ray[0] * ray[0] + 2.0 * value[1] * ray[0] * ray[1] + value[2] * ray[1] * ray[1];
     let step = -(ray[0] * gradient[0] + ray[1] * gradient[1]) / curvature;
     [ray[0] * step, ray[1] * step]
-}
-
-/// Steps at which the first slack and the first multiplier would vanish.
-fn longest(rows: &[Row]) -> (f64, f64) {
-    let (mut primal, mut dual) = (0.0_f64, 0.0_f64);
-    for row in rows {
-        primal = primal.max(-row.slack_step / row.slack);
-        dual = dual.max(-row.multiplier_step / row.multiplier);
-    }
-    (1.0 / primal.max(f64::MIN_POSITIVE), 1.0 / dual.max(f64::MIN_POSITIVE))
 }

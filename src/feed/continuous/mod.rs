@@ -75,8 +75,7 @@ pub(super) struct Continuous {
 impl Flow {
     /// A piece that moves; its curve has no step of direction or curvature inside.
     pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool) -> Self {
-        let ends = [0.0, path.length_lu()].map(|s_lu| Derivatives::from(path.at(s_lu)));
-        let ends_lu_s = ends.map(|state| grid::constant_speed_lu_s(&rules, path, &state));
+        let ends_lu_s = grid::end_speeds_lu_s(&rules, path);
         Self { rules, blend, ends_lu_s, grid: None }
     }
 
