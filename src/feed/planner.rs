@@ -203,12 +203,12 @@ impl Planner {
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
                 if flows {
                     let flow = Flow::new(rules.clone(), &path, blend);
-                    check_flow(&flow, length_lu, &path)?;
+                    check_flow(&flow, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
                     self.last = Some((ends, rules));
                     Motion::Flows(Box::new(flow))
                 } else {
                     let limits = rules.piece(contour, curve, &ends, worst.as_ref());
-                    check_motion(&limits, length_lu, &path)?;
+                    check_motion(&limits, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
                     self.last = Some((ends, rules));
                     let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
                     Motion::Moves { limits, length_lu, block_length_lu }
@@ -517,12 +517,13 @@ impl Motion {
 const PLANNED_PIECES_MAX: usize = 4096;
 
 /// As [`check_motion`], under `continuous`.
-fn check_flow(flow: &Flow, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+fn check_flow(flow: &Flow, length_lu: f64, path: &JointPath, blocked: Option<String>) -> Result<(), Box<Diagnostic>> {
     let [first_lu_s, last_lu_s] = flow.ends_lu_s();
-    if [length_lu, first_lu_s, last_lu_s].iter().all(|number| number.is_finite() && *number > 0.0) {
+    let numbers = [length_lu, first_lu_s, last_lu_s];
+    if blocked.is_none() && numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
         return check_time(length_lu / first_lu_s.max(last_lu_s), path);
     }
-    Err(no_speed(path))
+    Err(no_speed(path, blocked))
 }
 
 /// A motion or wait longer than this is an alarm: 1e6 s are 11 days.
@@ -531,7 +532,12 @@ const PIECE_TIME_MAX_S: f64 = 1e6;
 /// The alarm of a motion whose length or limits are not numbers, or which takes for ever: without numbers there is no law, and to
 /// leave the piece out would make the axes jump over it. Checked machines and programs within their bounds do not give the first; a
 /// feed of 1e-7 mm/min or a position of 1e15 mm gives the second.
-fn check_motion(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+fn check_motion(
+    limits: &PieceLimits,
+    length_lu: f64,
+    path: &JointPath,
+    blocked: Option<String>,
+) -> Result<(), Box<Diagnostic>> {
     let dynamics = &limits.bounds.dynamics;
     let numbers = [
         length_lu,
@@ -543,16 +549,18 @@ fn check_motion(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Resul
     if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
         return check_time(length_lu / limits.cap.velocity_lu_s, path);
     }
-    Err(no_speed(path))
+    Err(no_speed(path, blocked))
 }
 
-fn no_speed(path: &JointPath) -> Box<Diagnostic> {
+fn no_speed(path: &JointPath, blocked: Option<String>) -> Box<Diagnostic> {
     let line = path.contour.block.line;
     let message = format!("the motion of line {line} has no speed that every axis allows");
-    Box::new(
-        Diagnostic::error("P0001", message)
+    Box::new(match blocked {
+        Some(blocked) => Diagnostic::error("P0001", format!("{message}: {blocked}"))
+            .help("look at the limits of that axis in the machine file, with its dynamics sets"),
+        None => Diagnostic::error("P0001", message)
             .help("look for coordinates far outside the machine, or a circle of hardly any radius"),
-    )
+    })
 }
 
 /// The alarm of a motion or wait that lasts `time_s` at least.

@@ -36,6 +36,9 @@ pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
 /// degenerates, and crossing it at the speed that its curvature allows lasts longer than the stop.
 const REVERSAL_COS_MIN: f64 = 0.01;
 
+/// cos(theta/2) below which a polynomial that carries rotary axes is compared with a stop (turning angles above 139 deg).
+const SHARP_COS_MAX: f64 = 0.35;
+
 /// Direction cosines below this are rounding of coordinates: such an axis neither moves nor reverses.
 const DIRECTION_MIN_RATIO: f64 = 1e-9;
 
@@ -259,6 +262,14 @@ impl Rules {
         let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
         let t_max_lu = room.clamped(f64::INFINITY);
         let blend = common(&pair, t_max_lu, tolerances, |t| cuts(before, after, t, room.free_lu))?;
+        let (u, v) = (before.curve.at(f64::INFINITY), after.curve.at(0.0));
+        let [along, onward] = [u.first, v.first].map(|direction| direction.masked(&self.linear));
+        // The tip almost turns back: what rotary axes have to do on the way is pressed into almost no length.
+        let carries = u.first != along || v.first != onward;
+        let sharp = carries && (turning_angle(&along, &onward) / 2.0).cos() < SHARP_COS_MAX;
+        if sharp && Dynamics::new(&self.machine, before, after, [&u, &v]).stop_is_quicker(&blend.curve) {
+            return Some(Junction::Stop);
+        }
         Some(blended(blend, angle_rad))
     }
 

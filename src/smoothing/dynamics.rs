@@ -10,12 +10,15 @@
 use super::corner::Side;
 use super::smoother::lower;
 use crate::base::{AxisId, AxisVector, PerAxis};
-use crate::geometry::CurveState;
+use crate::geometry::{Curve, CurveState};
 use crate::interpreter::{Feed, Modes};
 use crate::machine::{AccelerationMode, Machine, TimeLawKind};
 
 /// A blend is no shorter than this: a feed so low that less would do is no reason for a bend that no control resolves.
 pub(super) const LENGTH_MIN_LU: f64 = 1e-4;
+
+/// Samples along a sharp blend.
+const CROSSING_SAMPLES: usize = 128;
 
 /// Feed at a corner and what the axes can do there.
 #[derive(Clone, Debug)]
@@ -25,6 +28,8 @@ pub(super) struct Dynamics {
     /// For the bend; infinite where an axis has no limit.
     acceleration_lu_s2: PerAxis<f64>,
     jerk_lu_s3: PerAxis<f64>,
+    /// About what it takes to come to rest from the feed and to go on.
+    stop_s: f64,
 }
 
 impl Dynamics {
@@ -45,12 +50,16 @@ impl Dynamics {
             speed_lu_s,
             acceleration_lu_s2: PerAxis::splat(f64::INFINITY),
             jerk_lu_s3: PerAxis::splat(f64::INFINITY),
+            stop_s: 0.0,
         };
+        let (mut braking_lu_s2, mut braking_lu_s3) = (f64::INFINITY, f64::INFINITY);
         for id in machine.axis_ids() {
             let limits = limits(machine, id, modes);
             let along = ends[0].first[id].abs().max(ends[1].first[id].abs());
             if along > 0.0 {
                 speed_lu_s = speed_lu_s.min(limits.velocity_lu_s / along);
+                braking_lu_s2 = braking_lu_s2.min(limits.acceleration_lu_s2 / along);
+                braking_lu_s3 = braking_lu_s3.min(limits.jerk_lu_s3 / along);
             }
             dynamics.acceleration_lu_s2[id] = acceleration_share * limits.acceleration_lu_s2;
             if modes.acceleration_mode == AccelerationMode::Soft {
@@ -58,6 +67,7 @@ impl Dynamics {
             }
         }
         dynamics.speed_lu_s = speed_lu_s;
+        dynamics.stop_s = 2.0 * (speed_lu_s / braking_lu_s2 + braking_lu_s2 / braking_lu_s3);
         dynamics
     }
 
@@ -70,6 +80,21 @@ impl Dynamics {
             bend.max(turn)
         };
         AxisId::first(crate::base::AXES_MAX).map(needed).fold(LENGTH_MIN_LU, f64::max)
+    }
+
+    /// To come to rest in the corner takes less time than to cross the curve at the speed that its sharpest place allows.
+    pub(super) fn stop_is_quicker(&self, curve: &Curve) -> bool {
+        let length_lu = curve.length_lu();
+        let demand = |i: usize| {
+            let state = curve.at(length_lu * i as f64 / CROSSING_SAMPLES as f64);
+            let slowness = |axis: AxisId| {
+                let bend = (state.second[axis].abs() / self.acceleration_lu_s2[axis]).sqrt();
+                bend.max((state.third[axis].abs() / self.jerk_lu_s3[axis]).cbrt())
+            };
+            AxisId::first(crate::base::AXES_MAX).map(slowness).fold(0.0, f64::max)
+        };
+        let slowest_s_per_lu = (0..=CROSSING_SAMPLES).map(demand).fold(0.0, f64::max);
+        length_lu * slowest_s_per_lu > self.stop_s
     }
 
     /// Greatest share of what an axis may spend that these derivatives take at the feed.

@@ -10,9 +10,13 @@ const RUNS_MAX: usize = 600;
 /// Whether a program fails in the way that is looked for.
 type Failing<'a> = &'a dyn Fn(&Program) -> Option<Finding>;
 
-/// Drops blocks while the program still fails in the same way.
+/// What is over the limit may shrink to this share of itself: what is left is to show the same fault, not any.
+const EXCESS_RATIO: f64 = 0.3;
+
+/// Drops blocks while the program still fails in the same way, and not by much less.
 fn smallest(program: &Program, failing: Failing<'_>) -> Option<(Program, Finding)> {
     let mut best = (program.clone(), failing(program)?);
+    let least = 1.0 + EXCESS_RATIO * (best.1.ratio - 1.0);
     let mut runs = 0;
     'again: loop {
         for smaller in best.0.clone().smaller() {
@@ -20,7 +24,7 @@ fn smallest(program: &Program, failing: Failing<'_>) -> Option<(Program, Finding
             if runs > RUNS_MAX {
                 return Some(best);
             }
-            if let Some(finding) = failing(&smaller) {
+            if let Some(finding) = failing(&smaller).filter(|finding| finding.ratio >= least) {
                 best = (smaller, finding);
                 continue 'again;
             }

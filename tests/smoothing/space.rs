@@ -259,3 +259,22 @@ fn odd_corners_and_blocks_are_passed_without_a_gap() {
         }
     }
 }
+
+/// The tip turns back but for 2 degrees, and C has to go on meanwhile: a blend of microns would be crossed in half a minute.
+#[test]
+fn a_blend_that_takes_longer_than_a_stop_is_none() {
+    for shape in [BlendShape::Hermite3, BlendShape::Quintic] {
+        let centre_mm = [-0.166_558, -0.025_364];
+        let (start, end) = ([0.0, 0.0], [-0.208_026, -0.188_659]);
+        let angle = |p: [f64; 2]| (p[1] - centre_mm[1]).atan2(p[0] - centre_mm[0]);
+        let sweep_rad = -(angle(start) - angle(end)).rem_euclid(std::f64::consts::TAU);
+        let radius_mm = f64::hypot(end[0] - centre_mm[0], end[1] - centre_mm[1]);
+        let mut moves = vec![line(1, &end), line(2, &[-0.1940, -0.1927, 0.0, -0.0702_f64.to_radians()])];
+        moves[0].kind = MoveKind::Arc(ArcGeometry { plane: [X, Y], centre_mm, radius_mm, sweep_rad });
+        moves.iter_mut().for_each(|moved| moved.modes.contour_tolerance_mm = Some(0.075));
+        assert_eq!(kinds(&run(&control(shape), &moves).0), "l|l|", "{shape:?}");
+        // The same corner, less sharp, is rounded.
+        moves[1].end = point(&[-0.2, 0.2, 0.0, -0.0702_f64.to_radians()]);
+        assert_eq!(kinds(&run(&control(shape), &moves).0), "lbl|", "{shape:?}");
+    }
+}
