@@ -33,8 +33,10 @@ const FASTER_MAX_RATIO: f64 = 2.0;
 /// Away from the ends of a piece an interval takes at most this share of the time to the nearer end.
 const GROWTH_SHARE: f64 = 0.3;
 
-/// The middle alone says too little about a polynomial.
+/// The middle alone says too little about a curve.
 const POLYNOMIAL_CUTS: u32 = 1;
+const MAPPED_CUTS: u32 = 1;
+const BLEND_CUTS: u32 = 2;
 
 /// Where a piece is looked at for its slow places.
 const SLOW_PLACES_SHARE: [f64; 3] = [0.3, 0.5, 0.7];
@@ -181,6 +183,7 @@ impl From<JointState> for Derivatives {
 struct Cutter<'a> {
     rules: &'a AxisRules,
     path: &'a JointPath,
+    blend: bool,
     length_lu: f64,
     ends: [End; 2],
     /// A straight piece has the same derivatives everywhere.
@@ -264,6 +267,7 @@ impl<'a> Cutter<'a> {
         Self {
             rules,
             path,
+            blend,
             length_lu,
             ends,
             straight,
@@ -327,8 +331,7 @@ impl<'a> Cutter<'a> {
             || (self.ends[1] == End::Rest && end_lu == self.length_lu && start_lu > 0.0);
         let mut from = (start_lu, at_start);
         let mut waiting = vec![((end_lu, at_end), 0)];
-        let cuts_min =
-            if matches!(self.path.contour.curve(), Some(Curve::Polynomial(_))) { POLYNOMIAL_CUTS } else { 0 };
+        let cuts_min = self.cuts_min();
         while let Some((to, cuts)) = waiting.pop() {
             let middle_lu = 0.5 * (from.0 + to.0);
             let middle = self.look(middle_lu);
@@ -343,6 +346,16 @@ impl<'a> Cutter<'a> {
                 waiting.push((to, cuts + 1));
                 waiting.push(((middle_lu, middle), cuts + 1));
             }
+        }
+    }
+
+    /// Cuts without which the middle says too little: in a blend q''' goes from 0 over a summit to 0 in the middle.
+    fn cuts_min(&self) -> u32 {
+        match self.path.contour.curve() {
+            _ if !self.path.is_contour() => MAPPED_CUTS,
+            Some(Curve::Line(_) | Curve::Arc(_) | Curve::SpatialArc(_)) | None => 0,
+            Some(Curve::Polynomial(_)) if !self.blend => POLYNOMIAL_CUTS,
+            Some(_) => BLEND_CUTS,
         }
     }
 

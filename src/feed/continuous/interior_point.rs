@@ -183,11 +183,7 @@ impl Solver {
         let count = problem.rows.len() as f64;
         self.first_slacks(problem, count);
         let mut stalls = 0;
-        let debug = std::env::var("SOLLWERT_DEBUG").is_ok_and(|x| x == "2");
-        if debug {
-            eprintln!("new {} {}", self.nodes.len(), problem.rows.len());
-        }
-        for it in 0..STEPS_MAX {
+        for _ in 0..STEPS_MAX {
             let (gap, residual) = self.linearise(problem);
             if !gap.is_finite() {
                 return Outcome::Failed;
@@ -206,9 +202,6 @@ impl Solver {
             let share = STEP_SHARE.max(1.0 - gap);
             let step = (share * primal.min(dual)).min(1.0);
             self.advance(problem, step);
-            if debug {
-                eprintln!("  it {it} gap {gap:.3e} res {residual:.3e} step {step:.3e} p {primal:.2e} d {dual:.2e}");
-            }
             // Where hardly anything is free the multipliers grow without bound, and the steps vanish: a point that keeps the limits will do.
             let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= STALLED_RESIDUAL_MAX;
             stalls = if usable && step < STALL_STEP { stalls + 1 } else { 0 };

@@ -7,10 +7,13 @@
 //! Does not know what a block is.
 
 mod chain;
+mod estimate;
 mod grid;
+mod held;
 mod interior_point;
 mod law;
 mod refuge;
+mod rows;
 
 use super::limits::AxisRules;
 use super::profile::SpeedCap;
@@ -113,14 +116,6 @@ impl Continuous {
             Derivatives::from(pieces[piece].path.at(s_lu))
         };
         let Some(profile) = self.attempt(&mut chain, start, &look) else {
-            if std::env::var("SOLLWERT_DEBUG").is_ok() {
-                eprintln!(
-                    "no plan: start {start:?} intervals {} pieces {} refuge {}",
-                    chain.intervals.len(),
-                    count,
-                    self.pieces.is_empty()
-                );
-            }
             // What was planned before still stands, to its end.
             self.kept = self.chain.intervals.len();
             if self.pieces.is_empty() {
