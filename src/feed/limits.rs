@@ -64,8 +64,8 @@ pub(super) struct AxisRules {
 /// while the speed is high: it is a little quicker.
 #[derive(Clone, Debug)]
 pub(super) struct DriveRules {
-    slow: AxisRules,
-    weak: AxisRules,
+    pub slow: AxisRules,
+    pub weak: AxisRules,
 }
 
 /// Programmed feed of a piece.

@@ -16,6 +16,7 @@ pub mod profile;
 mod programmed;
 mod published;
 pub mod ramp;
+mod rules;
 mod scan;
 mod split;
 mod varying;
@@ -24,4 +25,5 @@ mod worst;
 
 pub use planner::Planner;
 pub use programmed::ProgrammedTime;
+pub use rules::{AxisCaps, PathRules, PieceRules};
 pub use wire::*;

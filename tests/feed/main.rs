@@ -5,6 +5,7 @@ mod circular_contours;
 mod curves;
 mod printed_loop;
 mod profile;
+mod programmed_time;
 mod published;
 mod sampled;
 mod support;
