@@ -5,7 +5,7 @@
 
 use crate::random::Random;
 use crate::settings::Settings;
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt::Write;
 
 /// One value an axis, in the machine's order; mm and degrees.
@@ -222,7 +222,7 @@ impl Printer<'_> {
             Motion::Arc { centre: [i, j], sweep_rad, way } => {
                 self.text += if *sweep_rad > 0.0 { "G3" } else { "G2" };
                 let (sin, cos) = sweep_rad.sin_cos();
-                let full = sweep_rad.abs() > 6.28;
+                let full = sweep_rad.abs() > TAU - 1e-3;
                 let mut way = *way;
                 way[0] = if full { 0.0 } else { i - i * cos + j * sin };
                 way[1] = if full { 0.0 } else { j - i * sin - j * cos };
@@ -312,10 +312,11 @@ impl Maker<'_> {
 
     /// The way of rotary axes beside a linear one of `length`, in one block of three: mostly some degrees a millimetre.
     fn turn(&mut self, way: &mut Way, length: f64) {
-        for i in self.settings.linear_axes()..self.settings.axes.len() {
+        let (from, to) = (self.settings.linear_axes(), self.settings.axes.len());
+        for way in &mut way[from..to] {
             if self.random.below(3) == 0 {
                 let most = if self.random.below(12) == 0 { 90.0 } else { (6.0 * length).min(45.0) };
-                way[i] = rounded(self.random.between(-most, most));
+                *way = rounded(self.random.between(-most, most));
             }
         }
     }
@@ -339,13 +340,13 @@ impl Maker<'_> {
         if linear > 2 {
             way[2] = length * climb;
         }
-        for i in 0..linear {
-            if (self.at[i] + way[i]).abs() > 60.0 {
-                way[i] = -way[i];
+        for (at, way) in self.at.iter_mut().zip(&mut way).take(linear) {
+            if (*at + *way).abs() > 60.0 {
+                *way = -*way;
                 self.heading_rad += FRAC_PI_2;
             }
-            way[i] = rounded(way[i]);
-            self.at[i] += way[i];
+            *way = rounded(*way);
+            *at += *way;
         }
         way
     }
