@@ -220,8 +220,12 @@ impl Planning {
         }
         problem.costs_ratio.iter_mut().for_each(|cost| *cost /= total);
         for k in 0..=count {
-            let mut node =
-                NodeRows { problem, scale: scale(k), fixed: k == 0 && start != Start::Rest, estimate_lu2_s2: estimate[k] };
+            let mut node = NodeRows {
+                problem,
+                scale: scale(k),
+                fixed: k == 0 && start != Start::Rest,
+                estimate_lu2_s2: estimate[k],
+            };
             node.state(caps[k], k.checked_sub(1).map(|k| &intervals[first + k]), &intervals[first + k]);
             if k < count {
                 let interval = &intervals[first + k];
@@ -276,8 +280,11 @@ impl Planning {
         let state = match start {
             Start::At(point) => scale.scaled(&point),
             Start::Rest => {
-                let ray =
-                    [1.0, ray_exponent(&chain.intervals[0]) / chain.intervals[0].length_lu() * scale.b_lu2_s2 / scale.slope_lu_s2];
+                let ray = [
+                    1.0,
+                    ray_exponent(&chain.intervals[0]) / chain.intervals[0].length_lu() * scale.b_lu2_s2
+                        / scale.slope_lu_s2,
+                ];
                 self.problem.start_ray_ratio = Some(ray);
                 ray.map(|component| 0.9 * component)
             }
@@ -298,7 +305,9 @@ impl Planning {
             let length_lu = chain.intervals[first + k.min(count - 1)].length_lu();
             let scale = Scale::new(self.estimate[k], length_lu);
             let [b, slope] = self.solver.state_ratio(k);
-            profile.points.push(PathPoint { speed_squared_lu2_s2: b * scale.b_lu2_s2, slope_lu_s2: slope * scale.slope_lu_s2 });
+            profile
+                .points
+                .push(PathPoint { speed_squared_lu2_s2: b * scale.b_lu2_s2, slope_lu_s2: slope * scale.slope_lu_s2 });
         }
         for k in 0..count {
             let (before, after) = (profile.points[first + k], profile.points[first + k + 1]);

@@ -67,8 +67,7 @@ impl Used {
             let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
             let acceleration = (second * b + 0.5 * first * slope).abs() / bound.acceleration_lu_s2;
             if acceleration > used.acceleration.0 || acceleration.is_nan() {
-                used.acceleration =
-                    (acceleration, Limit { kind: LimitKind::Acceleration, axis: Some(axis) });
+                used.acceleration = (acceleration, Limit { kind: LimitKind::Acceleration, axis: Some(axis) });
             }
             let Some(limit) = bound.jerk_lu_s3 else { continue };
             let jerk = (third * b + 1.5 * second * slope + 0.5 * first * bend_per_s2).abs() * b.max(0.0).sqrt() / limit;

@@ -6,7 +6,7 @@
 //!
 //! Minimised is `sum c_i / sqrt(b_i)`, the time: convex where b > 0. Each step of Mehrotra's predictor-corrector method is a linear-quadratic
 //! problem along the chain, solved by a Riccati recursion over 2 x 2 matrices, so that its cost goes with the number of intervals
-//! [Mehrotra 1992; Rao 1998]. The states need not obey the chain to begin with.
+//! [Mehrotra 1992]. The states need not obey the chain to begin with.
 //!
 //! The last interval has no control of its own (`b = 0` in its transition): the state at the end lies on a ray. The first state is
 //! given, or any point of a ray.
@@ -107,8 +107,10 @@ struct Node {
     gap: [f64; 2],
     /// Hessian: 00, 01, 11, 0u, 1u, uu.
     hessian: [f64; 6],
-    /// Of the cost, x0 only.
-    gradient: f64,
+    /// Gradient of cost and limits: without centring; what centring and the correction of second order add.
+    force: [f64; 3],
+    inward: [f64; 3],
+    correction: [f64; 3],
     /// Value function of the recursion: 00, 01, 11.
     value: [f64; 3],
     /// Of the control: its own curvature, and its coupling with the state.
@@ -182,9 +184,9 @@ impl Solver {
         }
         let count = problem.rows.len() as f64;
         self.first_slacks(problem, count);
-        let mut stalls = 0;
+        let (mut stalls, mut step) = (0, 0.0);
         for _ in 0..STEPS_MAX {
-            let (gap, residual) = self.linearise(problem);
+            let (gap, residual) = self.advance(problem, step);
             if !gap.is_finite() {
                 return Outcome::Failed;
             }
@@ -192,16 +194,13 @@ impl Solver {
                 return Outcome::Solved;
             }
             self.factorise(problem);
-            let (primal, dual) = self.direction(problem, 0.0);
-            let after: f64 = problem.rows.iter().map(|row| row.product_after(primal, dual)).sum();
-            let centring = (after / gap).powi(3).min(1.0) * gap / count;
-            for row in &mut problem.rows {
-                row.correction = row.slack_step * row.multiplier_step;
-            }
-            let (primal, dual) = self.direction(problem, centring);
+            self.backward(problem, 0.0, 0.0);
+            let predicted = self.predict(problem);
+            let centring = (predicted.gap_after(gap) / gap).powi(3).min(1.0) * gap / count;
+            self.backward(problem, centring, 1.0);
+            let (primal, dual) = self.correct(problem, centring);
             let share = STEP_SHARE.max(1.0 - gap);
-            let step = (share * primal.min(dual)).min(1.0);
-            self.advance(problem, step);
+            step = (share * primal.min(dual)).min(1.0);
             // Where hardly anything is free the multipliers grow without bound, and the steps vanish: a point that keeps the limits will do.
             let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= STALLED_RESIDUAL_MAX;
             stalls = if usable && step < STALL_STEP { stalls + 1 } else { 0 };
@@ -227,8 +226,14 @@ impl Solver {
         }
     }
 
-    /// Residuals, weights and Hessians at the present point: the complementarity gap, and the greatest residual.
-    fn linearise(&mut self, problem: &mut Problem) -> (f64, f64) {
+    /// Goes a step along the direction; then residuals, weights, Hessians and forces of the limits there: the complementarity gap, and the
+    /// greatest residual.
+    fn advance(&mut self, problem: &mut Problem, step: f64) -> (f64, f64) {
+        for node in &mut self.nodes {
+            node.state[0] += step * node.state_step[0];
+            node.state[1] += step * node.state_step[1];
+            node.control += step * node.control_step;
+        }
         let (mut total, mut residual) = (0.0, 0.0_f64);
         for i in 0..problem.transitions.len() {
             let (x, u, next) = (self.nodes[i].state, self.nodes[i].control, self.nodes[i + 1].state);
@@ -242,21 +247,28 @@ impl Solver {
         for ((node, end), cost) in self.nodes.iter_mut().zip(ends.iter()).zip(costs_ratio.iter()) {
             let b = node.state[0].max(f64::MIN_POSITIVE);
             let root = b.sqrt();
-            node.gradient = -0.5 * cost / (b * root);
+            let mut force = [-0.5 * cost / (b * root), 0.0, 0.0];
             let mut h = [0.75 * cost / (b * b * root), 0.0, CURVATURE_MIN, 0.0, 0.0, CURVATURE_MIN];
             for row in &mut rows[first..*end] {
+                row.slack += step * row.slack_step;
+                row.multiplier += step * row.multiplier_step;
                 row.residual = row.bound - row.along(&node.state, node.control) - row.slack;
                 residual = residual.max(row.residual.abs());
                 total += row.slack * row.multiplier;
                 row.inverse = 1.0 / row.slack;
                 row.weight = row.multiplier * row.inverse;
-                row.correction = 0.0;
+                let pull = -row.weight * row.residual;
                 let [a0, a1, a2] = row.a;
+                force = [force[0] + pull * a0, force[1] + pull * a1, force[2] + pull * a2];
                 let (w0, w1) = (row.weight * a0, row.weight * a1);
-                let added = [w0 * a0, w0 * a1, w1 * a1, w0 * a2, w1 * a2, row.weight * a2 * a2];
-                h.iter_mut().zip(added).for_each(|(h, added)| *h += added);
+                h[0] += w0 * a0;
+                h[1] += w0 * a1;
+                h[2] += w1 * a1;
+                h[3] += w0 * a2;
+                h[4] += w1 * a2;
+                h[5] += row.weight * a2 * a2;
             }
-            node.hessian = h;
+            (node.hessian, node.force) = (h, force);
             first = *end;
         }
         (total, residual)
@@ -291,80 +303,130 @@ impl Solver {
         }
     }
 
-    /// Newton's direction for a complementarity product of `centring`; the steps at which the first slack and the first multiplier would vanish.
-    fn direction(&mut self, problem: &mut Problem, centring: f64) -> (f64, f64) {
+    /// Newton's direction from the end to the start, for a complementarity product of `centring`, with a share of the correction of second
+    /// order; and the first step of the states.
+    fn backward(&mut self, problem: &Problem, centring: f64, corrected: f64) {
         let count = problem.transitions.len();
-        let Problem { rows, ends, transitions, start_ray_ratio, .. } = problem;
         let mut p = [0.0; 2];
         for i in (0..=count).rev() {
-            let first = if i == 0 { 0 } else { ends[i - 1] };
-            let mut g = [self.nodes[i].gradient, 0.0, 0.0];
-            for row in &rows[first..ends[i]] {
-                let force = (centring - row.correction) * row.inverse - row.weight * row.residual;
-                g.iter_mut().zip(row.a).for_each(|(g, a)| *g += force * a);
-            }
+            let next = if i < count { self.nodes[i + 1].value } else { [0.0; 3] };
+            let node = &mut self.nodes[i];
+            let g: [f64; 3] = std::array::from_fn(|k| {
+                let second_order =
+                    if corrected > 0.0 { centring * node.inward[k] - corrected * node.correction[k] } else { 0.0 };
+                node.force[k] + second_order
+            });
             if i == count {
                 p = [g[0], g[1]];
                 continue;
             }
-            let next = self.nodes[i + 1].value;
-            let node = &mut self.nodes[i];
-            let [a00, a01, a10, a11] = transitions[i].state_ratio;
-            let [b0, b1] = transitions[i].control_ratio;
+            let transition = &problem.transitions[i];
+            let [a00, a01, a10, a11] = transition.state_ratio;
+            let [b0, b1] = transition.control_ratio;
             let e = node.gap;
             let v = [p[0] + next[0] * e[0] + next[1] * e[1], p[1] + next[1] * e[0] + next[2] * e[1]];
             p = [g[0] + a00 * v[0] + a10 * v[1], g[1] + a01 * v[0] + a11 * v[1]];
             node.feedforward = 0.0;
-            if transitions[i].has_control() {
+            if transition.has_control() {
                 node.feedforward = -(g[2] + b0 * v[0] + b1 * v[1]) / node.control_curvature;
                 p[0] += node.control_coupling[0] * node.feedforward;
                 p[1] += node.control_coupling[1] * node.feedforward;
             }
         }
-        let mut dx = start_ray_ratio.map_or([0.0; 2], |ray| along_ray(ray, &self.nodes[0].value, &p));
+        self.nodes[0].state_step =
+            problem.start_ray_ratio.map_or([0.0; 2], |ray| along_ray(ray, &self.nodes[0].value, &p));
+    }
+
+    /// Steps of the control of node `i` and of the state after it.
+    fn step_on(&mut self, problem: &Problem, i: usize) {
+        let Some(transition) = problem.transitions.get(i) else {
+            self.nodes[i].control_step = 0.0;
+            return;
+        };
+        let node = &mut self.nodes[i];
+        let dx = node.state_step;
+        node.control_step = node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward;
+        let reached = transition.apply(&dx, node.control_step);
+        let gap = node.gap;
+        self.nodes[i + 1].state_step = [reached[0] + gap[0], reached[1] + gap[1]];
+    }
+
+    /// The affine direction: how far it leads, and what it changes to second order.
+    fn predict(&mut self, problem: &mut Problem) -> Prediction {
+        let mut prediction = Prediction::default();
+        let mut first = 0;
+        for i in 0..=problem.transitions.len() {
+            self.step_on(problem, i);
+            let node = &mut self.nodes[i];
+            let (mut inward, mut correction) = ([0.0; 3], [0.0; 3]);
+            for row in &mut problem.rows[first..problem.ends[i]] {
+                let slack_step = row.residual - row.along(&node.state_step, node.control_step);
+                let multiplier_step = -row.multiplier - row.weight * slack_step;
+                prediction.take(row, slack_step, multiplier_step);
+                row.correction = slack_step * multiplier_step;
+                let second = row.correction * row.inverse;
+                for ((inward, correction), a) in inward.iter_mut().zip(&mut correction).zip(row.a) {
+                    *inward += row.inverse * a;
+                    *correction += second * a;
+                }
+            }
+            (node.inward, node.correction) = (inward, correction);
+            first = problem.ends[i];
+        }
+        prediction
+    }
+
+    /// The corrected direction: the steps at which the first slack and the first multiplier would vanish.
+    fn correct(&mut self, problem: &mut Problem, centring: f64) -> (f64, f64) {
         let (mut primal, mut dual) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
         let mut first = 0;
-        for i in 0..=count {
-            let node = &mut self.nodes[i];
-            node.state_step = dx;
-            node.control_step =
-                if i < count { node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward } else { 0.0 };
-            for row in &mut rows[first..ends[i]] {
-                row.slack_step = row.residual - row.along(&dx, node.control_step);
+        for i in 0..=problem.transitions.len() {
+            self.step_on(problem, i);
+            let node = &self.nodes[i];
+            for row in &mut problem.rows[first..problem.ends[i]] {
+                row.slack_step = row.residual - row.along(&node.state_step, node.control_step);
                 row.multiplier_step =
                     (centring - row.correction) * row.inverse - row.multiplier - row.weight * row.slack_step;
                 primal = primal.max(-row.slack_step * row.inverse);
                 dual = dual.max(-row.multiplier_step / row.multiplier);
             }
-            first = ends[i];
-            if i < count {
-                let reached = transitions[i].apply(&dx, node.control_step);
-                dx = [reached[0] + node.gap[0], reached[1] + node.gap[1]];
-            }
+            first = problem.ends[i];
         }
         (1.0 / primal, 1.0 / dual)
     }
+}
 
-    fn advance(&mut self, problem: &mut Problem, step: f64) {
-        for node in &mut self.nodes {
-            node.state[0] += step * node.state_step[0];
-            node.state[1] += step * node.state_step[1];
-            node.control += step * node.control_step;
-        }
-        for row in &mut problem.rows {
-            row.slack += step * row.slack_step;
-            row.multiplier += step * row.multiplier_step;
-        }
+/// How far the affine direction leads, and the products of slacks and multipliers on the way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Prediction {
+    /// Reciprocals of the steps at which the first slack and the first multiplier would vanish.
+    primal: f64,
+    dual: f64,
+    /// Sums of multiplier times slack step, slack times multiplier step, and of both steps.
+    by_slack: f64,
+    by_multiplier: f64,
+    by_both: f64,
+}
+
+impl Prediction {
+    fn take(&mut self, row: &Row, slack_step: f64, multiplier_step: f64) {
+        self.primal = self.primal.max(-slack_step * row.inverse);
+        self.dual = self.dual.max(-multiplier_step / row.multiplier);
+        self.by_slack += row.multiplier * slack_step;
+        self.by_multiplier += row.slack * multiplier_step;
+        self.by_both += slack_step * multiplier_step;
+    }
+
+    /// The gap at the end of the longest step.
+    fn gap_after(&self, gap: f64) -> f64 {
+        let (primal, dual) = (1.0 / self.primal.max(1.0), 1.0 / self.dual.max(1.0));
+        gap + primal * self.by_slack + dual * self.by_multiplier + primal * dual * self.by_both
     }
 }
 
 impl Row {
     fn along(&self, state: &[f64; 2], control: f64) -> f64 {
         self.a[0] * state[0] + self.a[1] * state[1] + self.a[2] * control
-    }
-
-    fn product_after(&self, primal: f64, dual: f64) -> f64 {
-        (self.slack + primal.min(1.0) * self.slack_step) * (self.multiplier + dual.min(1.0) * self.multiplier_step)
     }
 }
 

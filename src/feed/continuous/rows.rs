@@ -53,7 +53,12 @@ impl Scale {
     pub fn to(&self, next: &Self, length_lu: f64) -> Transition {
         let h = length_lu;
         Transition {
-            state_ratio: [self.b_lu2_s2 / next.b_lu2_s2, h * self.slope_lu_s2 / next.b_lu2_s2, 0.0, self.slope_lu_s2 / next.slope_lu_s2],
+            state_ratio: [
+                self.b_lu2_s2 / next.b_lu2_s2,
+                h * self.slope_lu_s2 / next.b_lu2_s2,
+                0.0,
+                self.slope_lu_s2 / next.slope_lu_s2,
+            ],
             control_ratio: [0.5 * h * h * self.bend_per_s2 / next.b_lu2_s2, h * self.bend_per_s2 / next.slope_lu_s2],
         }
     }
