@@ -16,7 +16,7 @@
 
 use super::estimate::{Pace, bend_cap, ray_cap, ray_exponent};
 use super::grid::{Derivatives, Interval};
-use super::held::tighten;
+use super::held::{slowed, tighten};
 use super::interior_point::{Outcome, Problem, Solver};
 use super::rows::{NodeRows, Range, Scale};
 use crate::feed::Limit;
@@ -74,7 +74,7 @@ const STRAY_MAX_SHARE: f64 = 0.12;
 const NEAR_SHARE: f64 = 0.6;
 
 /// Attempts with tighter limits where those between the places do not hold.
-const ATTEMPTS_MAX: u32 = 6;
+const ATTEMPTS_MAX: u32 = 8;
 
 /// By how much limits give way, of what planning does not use of them anyway.
 const LOOSER_RATIOS: [f64; 3] = [0.0, 2e-4, 1.5e-3];
@@ -125,7 +125,7 @@ impl Planning {
             }
             attempts += 1;
             if attempts > ATTEMPTS_MAX {
-                return None;
+                return if start == Start::Rest { slowed(chain, profile, &range, look) } else { None };
             }
             self.take_estimate(&profile, &range);
         }

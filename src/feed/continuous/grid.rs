@@ -55,6 +55,9 @@ const BESIDE_RATIO: f64 = 1e-9;
 const LINE_RESERVE_RATIO: f64 = 0.998;
 const CURVE_RESERVE_RATIO: f64 = 0.992;
 
+/// Reserve of axis velocities, of the change of |q'| over an interval.
+const VELOCITY_RESERVE_RATIO: f64 = 0.02;
+
 /// An axis below this share of the greatest demands of all never comes near its limits.
 const IDLE_SHARE: f64 = 1e-3;
 
@@ -239,7 +242,15 @@ pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
 }
 
 fn cap(rules: &AxisRules, path: &JointPath, states: &[&Derivatives]) -> SpeedCap {
-    let share = |axis: AxisId| states.iter().fold(0.0_f64, |most, state| most.max(state.first[axis].abs()));
+    let share = |axis: AxisId| {
+        let most = states.iter().fold(0.0_f64, |most, state| most.max(state.first[axis].abs()));
+        let [from, middle, to] = states else { return most };
+        // Between the three places by the parabola through them, and by as much more as the third derivative may add.
+        let [left, middle, right] = [from, middle, to].map(|state| state.first[axis]);
+        let (slope, bend) = (0.5 * (right - left), left - 2.0 * middle + right);
+        let most = if slope.abs() < bend.abs() { most.max((middle - 0.5 * slope * slope / bend).abs()) } else { most };
+        most + VELOCITY_RESERVE_RATIO * (right - left).abs().max(bend.abs())
+    };
     match path.contour.curve() {
         Some(curve) => rules.driven(rules.feed_cap(&path.contour.feed, curve), share),
         None => super::super::junction::STOP,

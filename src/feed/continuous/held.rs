@@ -14,6 +14,9 @@ const TIGHTER_RATIO: f64 = 0.995;
 /// A limit that is used so far at the eighths of an interval holds between them.
 const HELD_RATIO: f64 = 0.9995;
 
+/// A profile that uses a limit this many times is not slowed down but given up.
+const SLOWED_MAX_RATIO: f64 = 4.0;
+
 /// Above this use of a limit the curve itself is looked at.
 const NEAR_RATIO: f64 = 0.9;
 
@@ -101,10 +104,12 @@ fn used_straight(interval: &Interval, profile: &Profile, chain: &Chain, index: u
         return f64::NAN;
     }
     let ends = [points[0], points[2]];
-    // Where the slope changes its sign b may lie above its ends by as much as the parabola bulges.
-    let bulge = (0.125 * bend * interval.length_lu().powi(2)).abs();
-    let b = bulge + ends.iter().fold(0.0_f64, |most, point| most.max(point.speed_squared_lu2_s2));
-    let b = if ends[0].slope_lu_s2 * ends[1].slope_lu_s2 < 0.0 { b } else { b - bulge };
+    let mut b = ends.iter().fold(0.0_f64, |most, point| most.max(point.speed_squared_lu2_s2));
+    let slope = points[0].slope_lu_s2;
+    if bend < 0.0 && slope > 0.0 && points[2].slope_lu_s2 < 0.0 {
+        // The vertex of the parabola lies inside.
+        b = points[0].speed_squared_lu2_s2 - 0.5 * slope * slope / bend;
+    }
     let slope = ends.iter().fold(0.0_f64, |most, point| most.max(point.slope_lu_s2.abs()));
     let mut most = 0.0_f64;
     for bound in &interval.bounds.axes {
@@ -150,6 +155,29 @@ fn summit(values: &[f64; 9]) -> f64 {
         }
     }
     most
+}
+
+/// The same profile from rest to rest, slower by what its limits are used too far: with time stretched by λ accelerations fall with λ², jerks with λ³.
+pub(super) fn slowed(
+    chain: &Chain,
+    mut profile: Profile,
+    range: &std::ops::Range<usize>,
+    look: &Look<'_>,
+) -> Option<Profile> {
+    let most = range
+        .clone()
+        .map(|index| used_inside(chain, &profile, index, look))
+        .fold(0.0_f64, |most, used| if used.is_nan() { used } else { most.max(used) });
+    if most.is_nan() || most > SLOWED_MAX_RATIO {
+        return None;
+    }
+    let ratio = HELD_RATIO / most.max(HELD_RATIO);
+    for point in &mut profile.points {
+        point.speed_squared_lu2_s2 *= ratio;
+        point.slope_lu_s2 *= ratio;
+    }
+    profile.bends_per_s2.iter_mut().for_each(|bend| *bend *= ratio);
+    Some(profile)
 }
 
 /// True if every limit holds inside every interval too; else the limits of those where it does not are tightened.

@@ -17,6 +17,7 @@
 struct Row {
     a: [f64; 3],
     bound: f64,
+    holds: bool,
     slack: f64,
     multiplier: f64,
     /// 1/slack and multiplier/slack at the present point.
@@ -66,6 +67,7 @@ impl Problem {
         self.rows.push(Row {
             a: a_ratio,
             bound: bound_ratio,
+            holds: false,
             slack: 0.0,
             multiplier: 0.0,
             inverse: 0.0,
@@ -85,9 +87,18 @@ impl Problem {
         }
     }
 
-    /// Every limit counts as so much wider.
+    /// The last limit never gives way.
+    pub fn hold_last(&mut self) {
+        if let Some(row) = self.rows.last_mut() {
+            row.holds = true;
+        }
+    }
+
+    /// Every limit that may give way counts as so much wider.
     pub fn loosen(&mut self, by_ratio: f64) {
-        self.rows.iter_mut().for_each(|row| row.bound += by_ratio * row.bound.abs().min(1.0));
+        for row in self.rows.iter_mut().filter(|row| !row.holds) {
+            row.bound += by_ratio * row.bound.abs().min(1.0);
+        }
     }
 
     /// The limits of the node at hand are complete.

@@ -92,12 +92,18 @@ impl NodeRows<'_> {
         self.problem.limit([b * b_unit, slope * slope_unit, bend * bend_unit], bound);
     }
 
+    /// The same for a limit that does not give way.
+    fn hold(&mut self, row: [f64; 3], bound: f64) {
+        self.push(row, bound);
+        self.problem.hold_last();
+    }
+
     /// Limits of the state alone.
     pub fn state(&mut self, cap_lu2_s2: f64, before: Option<&Interval>, after: &Interval) {
         if self.fixed {
             return;
         }
-        self.push([1.0 / cap_lu2_s2, 0.0, 0.0], 1.0);
+        self.hold([1.0 / cap_lu2_s2, 0.0, 0.0], 1.0);
         self.push([-1.0 / self.scale.b_lu2_s2, 0.0, 0.0], -LOWEST_RATIO);
         self.acceleration(after, &after.states[0]);
         if let Some(before) = before
@@ -128,11 +134,10 @@ impl NodeRows<'_> {
         // b + h b'/2 is what b bends towards between the two: where it lies between bounds, b does.
         if !self.fixed {
             let cap = interval.cap.velocity_lu_s * interval.cap.velocity_lu_s;
-            self.push([1.0 / cap, 0.5 * h / cap, 0.0], 1.0);
+            self.hold([1.0 / cap, 0.5 * h / cap, 0.0], 1.0);
             let lowest = self.scale.b_lu2_s2;
             self.push([-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO);
         }
-        let straight = interval.is_straight();
         let middle = 0.5 * (estimates[0] + estimates[1]);
         let places = [(0, estimates[0]), (1, middle), (2, estimates[1])];
         let reaches = places.map(|(place, estimate)| Reach::of(interval, &interval.states[place], estimate));
@@ -140,7 +145,7 @@ impl NodeRows<'_> {
             let Some(jerk) = bound.jerk_lu_s3 else { continue };
             let axis = bound.axis;
             for (place, estimate) in places {
-                if (straight && place == 1) || !reaches[place].jerks(bound, &interval.states[place]) {
+                if !reaches[place].jerks(bound, &interval.states[place]) {
                     continue;
                 }
                 let state = &interval.states[place];
