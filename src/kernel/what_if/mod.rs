@@ -241,7 +241,7 @@ impl<'a> Run<'a> {
             .filter(|(index, time_s)| *time_s > 0.0 && Some(self.moves[*index].block.program) == main)
             .map(|(index, time_s)| (self.moves[*index].block.line, *time_s))
             .collect();
-        all.sort_by(|a, b| a.0.cmp(&b.0));
+        all.sort_by_key(|entry| entry.0);
         for (line, time_s) in all {
             match lines.last_mut() {
                 Some((last, sum_s)) if *last == line => *sum_s += time_s,
