@@ -45,6 +45,9 @@
 //! 7. [`drive`] follows it: position, speed and current loops, motor and mechanics of every axis, down to the current cycle.
 //! 8. [`recorder`] writes all of it to MCAP on a thread of its own; [`kernel`] owns the loop.
 //!
+//! Beside the cycle, [`optimum`] takes the pieces that feed has planned and finds the least time for the same path under the same
+//! limits (`sollwert time --optimal`).
+//!
 //! ## As a library
 //!
 //! The command is one user of [`kernel::Kernel`]; this is another. A clone of the kernel is a snapshot of its whole state.
@@ -92,6 +95,7 @@ pub mod geometry;
 pub mod smoothing;
 pub mod kinematics;
 pub mod feed;
+pub mod optimum;
 pub mod interpolator;
 pub mod drive;
 pub mod recorder;

@@ -131,22 +131,21 @@ fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
 }
 
 #[test]
-fn a_machine_that_asks_for_what_is_not_built_is_refused_by_the_library_too() {
-    for set in ["feed.time_law=continuous", "feed.arc_limits=printed"] {
-        let loaded = machine("spinner_mvc850", &[set]);
-        let options = RunOptions {
-            machine: &loaded,
-            setup: program(PROGRAM).into(),
-            drives: false,
-            recording: None,
-            mantissa_bits: None,
-            signals: SignalChoice::all(),
-            threads: 1,
-            pace_ratio: None,
-        };
-        let refused = run(options, &mut |_| {}).err().expect("not built yet").0;
-        assert!(refused.code == "M0201" && refused.message.contains(set.split('=').next().unwrap()), "{refused:?}");
-    }
+fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
+    let set = "smoothing.limits=path";
+    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous", set]);
+    let options = RunOptions {
+        machine: &loaded,
+        setup: program(PROGRAM).into(),
+        drives: false,
+        recording: None,
+        mantissa_bits: None,
+        signals: SignalChoice::all(),
+        threads: 1,
+        pace_ratio: None,
+    };
+    let refused = run(options, &mut |_| {}).err().expect("not under this law").0;
+    assert!(refused.code == "M0201" && refused.message.contains(set.split('=').next().unwrap()), "{refused:?}");
 }
 
 #[test]
@@ -304,13 +303,12 @@ fn a_motion_without_a_speed_is_an_alarm_and_nothing_jumps_over_it() {
 fn limits_of_one_name_add_up() {
     let machine = machine("spinner_mvc850", &[]).machine;
     let (x, y) = (machine.axis_by_name("X"), machine.axis_by_name("Y"));
-    let mut figures = Figures::new(&machine);
-    figures.setpoints = 10;
-    figures.limits = vec![
+    let limits = vec![
         (Limit { kind: LimitKind::Corner, axis: x }, 3),
         (Limit { kind: LimitKind::Jerk, axis: y }, 2),
         (Limit { kind: LimitKind::Corner, axis: y }, 5),
     ];
+    let figures = Figures { setpoints: 10, limits, ..Figures::default() };
     let limits = RunSummary::new(&machine, "part.mpf", &figures, false).limits;
     assert_eq!(limits.into_iter().collect::<Vec<_>>(), [("Y.jerk".to_owned(), 0.2), ("corner".to_owned(), 0.8)]);
 }

@@ -16,6 +16,7 @@ mod output;
 mod recover;
 mod run;
 mod time;
+mod what_if;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

@@ -62,7 +62,7 @@ pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: FeedCap, jer
     let safe = scan.safe_feed(&samples);
     let geometric = match rules.blend_law {
         BlendLaw::Limits => safe,
-        // "published" has the same entry; its step law is refused with the machine file.
+        // "published" has the same entry; what follows it is `published`'s.
         BlendLaw::Entry | BlendLaw::Published => scan.entry_feed(),
     };
     let driven = rules.driven(feed, |axis| scan.tangent(axis));
@@ -75,11 +75,14 @@ pub(super) fn limits(rules: &AxisRules, blend: &HermiteBlend, feed: FeedCap, jer
         |demand: Demand, factor: f64| Demand { demand_ratio: demand.demand_ratio * factor / left, ..demand };
     let jerk = over_left(jerk, 1.0);
     let coupled = over_left(coupled, v * SAMPLE_RESERVE_RATIO);
-    if !jerk_limited || coupled.demand_ratio <= acceleration.demand_ratio {
-        return PieceLimits::new(cap, ramp_cap, acceleration, jerk, jerk_limited);
+    let mut limits = PieceLimits::new(cap, ramp_cap, acceleration, jerk, jerk_limited);
+    if jerk_limited && coupled.demand_ratio > acceleration.demand_ratio {
+        limits = PieceLimits::new(cap, ramp_cap, coupled, jerk, jerk_limited);
+        limits.bounds.acceleration = coupled.limit(LimitKind::RadialJerk);
     }
-    let mut limits = PieceLimits::new(cap, ramp_cap, coupled, jerk, jerk_limited);
-    limits.bounds.acceleration = coupled.limit(LimitKind::RadialJerk);
+    if jerk_limited && rules.blend_law == BlendLaw::Published {
+        limits.exit_cap = driven;
+    }
     limits
 }
 
@@ -106,8 +109,13 @@ impl<'a> Scan<'a> {
         Self { rules, blend, along: middle.tangent, inward: middle.normal, half_angle_rad, width_ratio, range_ratio }
     }
 
-    /// Largest |T| of an axis: T turns from half the angle before its middle direction to half the angle after it.
+    /// What counts of the largest |T| of an axis.
     fn tangent(&self, axis: AxisId) -> f64 {
+        self.rules.blend_component(self.blend, self.turned(axis), axis)
+    }
+
+    /// Largest |T| of an axis: T turns from half the angle before its middle direction to half the angle after it.
+    fn turned(&self, axis: AxisId) -> f64 {
         let (along, inward) = (self.along[axis].abs(), self.inward[axis].abs());
         let (sin, cos) = self.half_angle_rad.sin_cos();
         if inward * cos <= along * sin { along.hypot(inward) } else { along * cos + inward * sin }
@@ -140,12 +148,16 @@ impl<'a> Scan<'a> {
         BlendPoint { tangent, normal, ..*point }
     }
 
+    fn component(&self, component: f64, axis: AxisId) -> f64 {
+        self.rules.blend_component(self.blend, component, axis)
+    }
+
     fn demand(&self, watch: Watch, point: &BlendPoint) -> Demand {
         let (ra, rj) = (self.rules.radial_acceleration_share, self.rules.radial_jerk_share);
         let k = point.curvature_per_mm.abs();
         let k_slope = point.curvature_slope_per_mm_mm.abs();
         self.rules.largest(|axis, limits| {
-            let (t, n) = (point.tangent[axis].abs(), point.normal[axis].abs());
+            let [t, n] = [point.tangent[axis], point.normal[axis]].map(|part| self.component(part, axis));
             let (a_max, j_max) = (limits.acceleration_max_lu_s2, limits.transition_jerk_max_lu_s3);
             match watch {
                 Watch::Radial => k * n / (ra * a_max),

@@ -1,6 +1,6 @@
 //! FGROUP: F holds along the path of the axes of the group.
 //!
-//! In: the group with FGREF, a curve. Out: how long the way of the group is for a unit of s. On a line, and on an arc with both axes
+//! In: the group with FGREF, a curve. Out: how long the way of the group is for a unit of s, and along the whole curve. On a line, and on an arc with both axes
 //! of its plane in the group or neither, that is one number; elsewhere the greatest on the curve is taken, so that the feed of the
 //! group is nowhere above F (the control follows it along the curve). A rotary axis counts with FGREF times its angle. Where no
 //! axis of the group moves, F holds along s, as without FGROUP.
@@ -8,7 +8,6 @@
 use crate::base::{AxisId, AxisVector, PerAxis};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU};
 use crate::interpreter::ProgrammedLimits;
-use crate::machine::Machine;
 
 /// Places at which a curve that is neither line nor arc is looked at.
 const PLACES: u32 = 32;
@@ -22,8 +21,7 @@ pub(super) struct FeedGroup {
 }
 
 impl FeedGroup {
-    pub(super) fn new(machine: &Machine, members: PerAxis<bool>, programmed: &ProgrammedLimits) -> Self {
-        let linear = machine.linear_mask();
+    pub(super) fn new(linear: &PerAxis<bool>, members: PerAxis<bool>, programmed: &ProgrammedLimits) -> Self {
         let weight = |id: AxisId| if linear[id] { 1.0 } else { programmed.reference_radius_mm[id] };
         Self { members, weights: PerAxis::from_fn(|id| if members[id] { weight(id) } else { 0.0 }) }
     }
@@ -44,6 +42,17 @@ impl FeedGroup {
             }
         };
         if ratio * curve.length_lu() < DISPLACEMENT_MIN_LU { 1.0 } else { ratio }
+    }
+
+    /// Way of the group along the curve; that of the curve where the group does not move.
+    pub(super) fn way_lu(&self, curve: &Curve) -> f64 {
+        let step_lu = curve.length_lu() / f64::from(PLACES);
+        let middles = (0..PLACES).map(|i| self.along(&curve.at((f64::from(i) + 0.5) * step_lu).first));
+        let way_lu = match curve {
+            Curve::Line(_) => self.way_ratio(curve) * curve.length_lu(),
+            _ => middles.sum::<f64>() * step_lu,
+        };
+        if way_lu < DISPLACEMENT_MIN_LU { curve.length_lu() } else { way_lu }
     }
 
     fn along(&self, first: &AxisVector) -> f64 {

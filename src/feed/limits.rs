@@ -5,17 +5,18 @@
 //! `q''' v³ + 3 q'' v a + q' j`: for every axis the sums stay inside its limits wherever v, a and j stay inside those found here.
 //! Does not look at neighbours: what a junction allows is [`junction`](super::junction)'s.
 
-use super::blend_limits;
 use super::group::FeedGroup;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use super::ramp::Dynamics;
 use super::worst::Worst;
-use super::{Limit, LimitKind};
-use crate::base::AxisId;
-use crate::geometry::Curve;
+use super::{Limit, LimitKind, blend_limits, printed_arc};
+use crate::base::{AxisId, PerAxis};
+use crate::geometry::{Curve, HermiteBlend};
 use crate::interpreter::{Feed, Modes, ProgrammedLimits};
 use crate::kinematics::JointState;
-use crate::machine::{AccelerationMode, AxisLimits, BlendLaw, CornerRule, CurvatureJump, FeedSettings, Machine};
+use crate::machine::{
+    AccelerationMode, ArcLimits, AxisLimits, BlendLaw, BlendLimits, CornerRule, CurvatureJump, FeedSettings, Machine,
+};
 use crate::smoothing::ContourPiece;
 
 /// The jerk that is left on an arc is split in these many parts between its two uses.
@@ -36,8 +37,14 @@ pub(super) struct AxisRules {
     pub radial_jerk_share: f64,
     /// Feed inside a blend.
     pub blend_law: BlendLaw,
+    /// Inside a blend every axis counts with all of the path's acceleration and jerk: the older model.
+    pub path_limits: bool,
+    /// Which axes are linear.
+    pub linear: PerAxis<bool>,
     /// How a change of curvature is measured.
     pub curvature_jump: CurvatureJump,
+    /// Limits of arcs.
+    pub arc_limits: ArcLimits,
     /// t_s.
     pub setpoint_period_s: f64,
     /// SOFT.
@@ -57,8 +64,8 @@ pub(super) struct AxisRules {
 /// while the speed is high: it is a little quicker.
 #[derive(Clone, Debug)]
 pub(super) struct DriveRules {
-    slow: AxisRules,
-    weak: AxisRules,
+    pub slow: AxisRules,
+    pub weak: AxisRules,
 }
 
 /// Programmed feed of a piece.
@@ -84,6 +91,8 @@ pub(super) struct Demand {
 pub(super) struct PieceLimits {
     /// Highest speed anywhere on the piece, alone.
     pub cap: SpeedCap,
+    /// Highest speed at its end; higher than `cap` where the law inside is one of its own (`blend_law = "published"`).
+    pub exit_cap: SpeedCap,
     /// Up to here the speed may change; above it must be the same all along (blends only).
     pub ramp_cap: SpeedCap,
     /// Tangential acceleration and jerk and what sets them.
@@ -121,7 +130,7 @@ impl AxisRules {
 
     fn with_axes(machine: &Machine, programmed: &ProgrammedLimits, axes: Vec<AxisLimits>) -> Self {
         let setpoint_period_s = machine.cycle.time_base.setpoint_period_s();
-        let FeedSettings { corner_rule, overload_ratio, curvature_jump, .. } = machine.feed;
+        let FeedSettings { corner_rule, overload_ratio, curvature_jump, arc_limits, .. } = machine.feed;
         let corner_step = |(axis, limits): (&crate::machine::Axis, &AxisLimits)| {
             let a = limits.acceleration_max_lu_s2;
             match corner_rule {
@@ -130,8 +139,8 @@ impl AxisRules {
                 CornerRule::Overload => overload_ratio * a * setpoint_period_s,
             }
         };
-        let group = programmed.feed_group.map(|members| FeedGroup::new(machine, members, programmed));
         let linear = machine.linear_mask();
+        let group = programmed.feed_group.map(|members| FeedGroup::new(&linear, members, programmed));
         let feed_velocity = |(id, limits): (AxisId, &AxisLimits)| {
             let synchronous = group.as_ref().map_or(!linear[id], |group| !group.contains(id));
             let limit_lu_s = programmed.synchronous_max_lu_s[id].filter(|_| synchronous).unwrap_or(f64::INFINITY);
@@ -144,7 +153,10 @@ impl AxisRules {
             radial_acceleration_share: machine.smoothing.radial_acceleration_share,
             radial_jerk_share: machine.smoothing.radial_jerk_share,
             blend_law: machine.smoothing.blend_law,
+            path_limits: machine.smoothing.limits == BlendLimits::Path,
+            linear,
             curvature_jump,
+            arc_limits,
             setpoint_period_s,
             jerk_limited: true,
             override_ratio: programmed.override_ratio,
@@ -185,6 +197,12 @@ impl AxisRules {
         largest
     }
 
+    /// How much of the path's acceleration or jerk an axis counts inside a blend, for the component of a unit vector: that
+    /// component, or under `limits = "path"` all of it if the axis moves in the blend at all.
+    pub(super) fn blend_component(&self, blend: &HermiteBlend, component: f64, axis: AxisId) -> f64 {
+        if self.path_limits && self.linear[axis] { if blend.moves(axis) { 1.0 } else { 0.0 } } else { component.abs() }
+    }
+
     /// Limits of a piece on its curve.
     /// `worst` are the greatest demands along a curve that has no closed form for them.
     pub(super) fn piece(&self, piece: &ContourPiece, curve: &Curve, ends: &Ends, worst: Option<&Worst>) -> PieceLimits {
@@ -214,8 +232,8 @@ impl AxisRules {
         }
         match curve {
             Curve::Line(_) => self.line(&ends.start, feed, jerk_limited),
-            Curve::Arc(arc) => self.curved(&Worst::on_arc(arc), in_block, feed, jerk_limited),
-            Curve::SpatialArc(arc) => self.curved(&Worst::on_spatial_arc(arc), in_block, feed, jerk_limited),
+            Curve::Arc(arc) => self.arc(&Worst::on_arc(arc), &ends.start, feed, jerk_limited),
+            Curve::SpatialArc(arc) => self.arc(&Worst::on_spatial_arc(arc), &ends.start, feed, jerk_limited),
             // Unknown demands allow nothing: the planner refuses the piece.
             Curve::Polynomial(_) | Curve::Quintic(_) => self.curved(&Worst::unknown(), in_block, feed, jerk_limited),
             Curve::Blend(blend) => blend_limits::limits(self, blend, feed, jerk_limited),
@@ -264,6 +282,14 @@ impl AxisRules {
         let jerk = self.largest(|axis, limits| share(axis) / limits.jerk_max_lu_s3);
         let cap = self.driven(feed, share);
         PieceLimits::new(cap, cap, acceleration, jerk, jerk_limited)
+    }
+
+    /// An arc or helix, by the rule of the machine.
+    fn arc(&self, worst: &Worst, start: &JointState, feed: FeedCap, jerk_limited: bool) -> PieceLimits {
+        match self.arc_limits {
+            ArcLimits::Worst => self.curved(worst, |limits| limits.jerk_max_lu_s3, feed, jerk_limited),
+            ArcLimits::Printed => printed_arc::limits(self, worst, start, feed, jerk_limited),
+        }
     }
 
     /// An arc or helix: the worst direction met on it (models/arcs.md section 4), with the radial shares of models/local-smoothing.md
@@ -357,7 +383,7 @@ impl PieceLimits {
             acceleration: acceleration.limit(LimitKind::Acceleration),
             jerk: jerk.limit(LimitKind::Jerk),
         };
-        Self { cap, ramp_cap, bounds }
+        Self { cap, exit_cap: cap, ramp_cap, bounds }
     }
 
     /// About what is left for changes of speed on a curve, to judge how much way one takes.

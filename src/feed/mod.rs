@@ -4,14 +4,19 @@
 //! `look_ahead.blocks` motion blocks beyond the one that it fixes. Does not sample.
 
 mod blend_limits;
+mod continuous;
 mod group;
 mod junction;
 mod limits;
 mod modes;
 mod planner;
 mod positioning;
+mod printed_arc;
 pub mod profile;
+mod programmed;
+mod published;
 pub mod ramp;
+mod rules;
 mod scan;
 mod split;
 mod varying;
@@ -19,4 +24,6 @@ mod wire;
 mod worst;
 
 pub use planner::Planner;
+pub use programmed::ProgrammedTime;
+pub use rules::{AxisCaps, PathRules, PieceRules};
 pub use wire::*;

@@ -5,7 +5,8 @@
 
 use super::limits::AxisRules;
 use crate::interpreter::{Modes, ProgrammedLimits};
-use crate::machine::{AccelerationMode, DynamicsMode, Machine};
+use crate::kinematics::JointState;
+use crate::machine::{AccelerationMode, AxisLimits, DynamicsMode, Machine};
 use std::sync::Arc;
 
 /// The rules of the modes that were asked for last.
@@ -31,6 +32,24 @@ impl ModeRules {
     /// The machine.
     pub(super) fn machine(&self) -> &Arc<Machine> {
         &self.machine
+    }
+
+    /// The first axis that takes part in a path that begins with `start` and has a limit of 0 or none, in words; `None` where all
+    /// can move. The check of a machine file lets none of these through.
+    pub(super) fn blocked_axis(&self, rules: &AxisRules, start: &JointState) -> Option<String> {
+        let moving = self.machine.axis_ids().zip(&rules.axes).filter(|(id, _)| start.first[*id] != 0.0);
+        let named = moving.flat_map(|(id, limits)| {
+            let AxisLimits { velocity_max_lu_s, acceleration_max_lu_s2, jerk_max_lu_s3, transition_jerk_max_lu_s3 } =
+                *limits;
+            [
+                (id, velocity_max_lu_s, "velocity"),
+                (id, acceleration_max_lu_s2, "acceleration"),
+                (id, jerk_max_lu_s3, "jerk"),
+                (id, transition_jerk_max_lu_s3, "transition jerk"),
+            ]
+        });
+        let mut blocked = named.filter(|(_, limit, _)| limit.is_nan() || *limit <= 0.0);
+        blocked.next().map(|(id, _, what)| format!("axis {} has no {what}", self.machine.axis(id).name))
     }
 
     /// The rules under `modes`.

@@ -9,18 +9,21 @@
 //! met; it is exact where the speed at the end is settled.) A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
 //! Does not sample, and does not know axes: `limits` and `junction` do.
 
+use super::continuous::{Continuous, Flow, Piece};
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
 use super::modes::ModeRules;
 use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
+use super::published::{self, Tally};
 use super::split::{self, Part};
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
 use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
-use crate::machine::Machine;
+use crate::machine::{BlendLaw, Machine, TimeLawKind};
+use crate::program::BlockRef;
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -55,8 +58,14 @@ pub struct Planner {
     cutting_s: f64,
     /// Axes that move on their own.
     arrivals: Arrivals,
+    /// What the printed blend law did.
+    published: Tally,
+    /// Where it came to a stand first, and whether that has been told.
+    stalled: Option<(BlockRef, bool)>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
     half_blend_lu: f64,
+    /// The law `continuous`; `None` under `seven-phase`.
+    continuous: Option<Box<Continuous>>,
 }
 
 /// A piece in the window or before it.
@@ -94,6 +103,8 @@ enum Motion {
         /// The block's own share of the path, halves of its blends included, which must take one cycle at least; `None`: a blend.
         block_length_lu: Option<f64>,
     },
+    /// Along a curve, under the law `continuous`.
+    Flows(Box<Flow>),
     /// Stands still for a time.
     Waits { time_s: f64 },
     /// Stands still until these axes have arrived.
@@ -121,13 +132,28 @@ impl Planner {
             elapsed_s: 0.0,
             cutting_s: 0.0,
             arrivals: Arrivals::new(),
+            published: Tally::default(),
+            stalled: None,
             half_blend_lu: 0.0,
+            continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
         }
     }
 
     /// Time of everything that has been handed out, and of the motions with feed among it.
     pub fn elapsed_s(&self) -> (f64, f64) {
         (self.elapsed_s, self.cutting_s)
+    }
+
+    /// The alarm of the piece handed out last, with its block: the path comes to rest at the end of what was pushed, after
+    /// [`Planner::finish`].
+    pub fn take_alarm(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        let (block, told) = self.stalled.as_mut()?;
+        (!std::mem::replace(told, true)).then(|| (*block, published::stalled(*block)))
+    }
+
+    /// What a person should know about the laws handed out so far, with the block where it began; each once.
+    pub fn take_warning(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        std::mem::take(&mut self.published).warning()
     }
 
     /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken (of a
@@ -149,6 +175,9 @@ impl Planner {
         if !scanned || !path.length_lu().is_finite() {
             return self.push_part(Part { path, worst: None });
         }
+        if self.continuous.is_some() {
+            return split::smooth_parts(path).into_iter().try_for_each(|part| self.push_part(part));
+        }
         let rules = self.rules.of(&path.contour.modes);
         split::parts(&rules, path).into_iter().try_for_each(|part| self.push_part(part))
     }
@@ -163,18 +192,27 @@ impl Planner {
             PieceKind::Block(curve) | PieceKind::Blend(curve, _) if curve.length_lu() != 0.0 => {
                 let length_lu = curve.length_lu();
                 let blend = matches!(contour.kind, PieceKind::Blend(..));
+                let flows = self.continuous.is_some();
                 let (start, end) = (path.at(0.0), path.at(length_lu));
-                let ends = Ends { start, end, blend, rotary_only: curve.rotary_only() };
+                // Under `continuous` a step of curvature is one, wherever it is.
+                let ends = Ends { start, end, blend: blend && !flows, rotary_only: curve.rotary_only() };
                 let rules = self.rules.of(&contour.modes);
                 corner = self
                     .last
                     .as_ref()
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
-                let limits = rules.piece(contour, curve, &ends, worst.as_ref());
-                check_motion(&limits, length_lu, &path)?;
-                self.last = Some((ends, rules));
-                let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
-                Motion::Moves { limits, length_lu, block_length_lu }
+                if flows {
+                    let flow = Flow::new(rules.clone(), &path, blend);
+                    check_flow(&flow, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
+                    self.last = Some((ends, rules));
+                    Motion::Flows(Box::new(flow))
+                } else {
+                    let limits = rules.piece(contour, curve, &ends, worst.as_ref());
+                    check_motion(&limits, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
+                    self.last = Some((ends, rules));
+                    let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
+                    Motion::Moves { limits, length_lu, block_length_lu }
+                }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
                 check_time(*time_s, &path)?;
@@ -208,7 +246,10 @@ impl Planner {
         if self.admitted == 0 || !(self.full || self.finished || self.rests > 0) {
             return None;
         }
-        self.plan_backward();
+        let flowing = self.flow();
+        if self.continuous.is_none() {
+            self.plan_backward();
+        }
         let ahead = if self.admitted > 1 { self.entries[1].entry.cap } else { self.end_of_window().cap };
         let front = self.entries.pop_front()?;
         let machine = self.rules.machine();
@@ -220,10 +261,14 @@ impl Planner {
                 let (time_s, limit) = self.arrivals.wait(machine, axes, self.elapsed_s);
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
-            _ => front.fixed(self.entry, ahead, self.setpoint_period_s),
+            Motion::Flows(_) => (flowing.unwrap_or_default(), STOP),
+            _ => match self.printed_law(&front, ahead) {
+                Some(printed) => printed,
+                None => front.fixed(self.entry, ahead, self.setpoint_period_s),
+            },
         };
         self.elapsed_s += law.duration_s();
-        if matches!(front.motion, Motion::Moves { .. }) && front.path.contour.feed != Feed::Rapid {
+        if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_)) && front.path.contour.feed != Feed::Rapid {
             self.cutting_s += law.duration_s();
         }
         let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings };
@@ -238,6 +283,65 @@ impl Planner {
             self.rests -= usize::from(next.rests_before());
         }
         Some(piece)
+    }
+
+    /// The printed law of a blend, where the machine asks for it and it leaves with a speed that the path ahead allows.
+    fn printed_law(&mut self, front: &Entry, ahead: SpeedCap) -> Option<(TimeLaw, SpeedCap)> {
+        let contour = &front.path.contour;
+        let (PieceKind::Blend(Curve::Blend(blend), _), true) = (&contour.kind, front.path.is_contour()) else {
+            return None;
+        };
+        let rules = self.rules.of(&contour.modes);
+        if rules.blend_law != BlendLaw::Published || !rules.jerk_limited || self.stalled.is_some() {
+            return None;
+        }
+        let curve = contour.curve()?;
+        let ahead = if front.rests_after { STOP } else { ahead };
+        match published::crossing(&rules, blend, rules.feed_cap(&contour.feed, curve), self.entry.velocity_lu_s) {
+            Ok(crossing) if crossing.exit_lu_s <= ahead.velocity_lu_s * published::RULE_RATIO => {
+                self.published.crossed(contour.block, &crossing);
+                let exit = SpeedCap { velocity_lu_s: crossing.exit_lu_s, limit: crossing.limit };
+                Some((crossing.law, exit.min(ahead)))
+            }
+            Ok(_) => {
+                self.published.guarded(contour.block);
+                None
+            }
+            Err(published::Stalled) => {
+                self.stalled = Some((contour.block, false));
+                None
+            }
+        }
+    }
+
+    /// The law of the front piece under `continuous`; `None` where it does not move.
+    fn flow(&mut self) -> Option<TimeLaw> {
+        let ends_path = self.window_ends_path();
+        let Self { continuous, entries, admitted, .. } = self;
+        let continuous = continuous.as_mut()?;
+        if !matches!(entries.front()?.motion, Motion::Flows(_)) {
+            return None;
+        }
+        if !continuous.holds_front() {
+            let mut pieces: Vec<Piece<'_>> = Vec::new();
+            for (index, entry) in entries.range_mut(..*admitted).take(PLANNED_PIECES_MAX).enumerate() {
+                let Entry { path, motion, corner, rests_after, .. } = entry;
+                if index > 0 && corner.velocity_lu_s == 0.0 {
+                    pieces.last_mut()?.rests_after = true;
+                    break;
+                }
+                let rests_after = *rests_after || (ends_path && index + 1 == *admitted);
+                match motion {
+                    Motion::Flows(flow) => pieces.push(Piece { path, flow, junction: *corner, rests_after }),
+                    _ => pieces.last_mut()?.rests_after |= rests_after,
+                }
+                if rests_after {
+                    break;
+                }
+            }
+            continuous.plan(&mut pieces);
+        }
+        continuous.take_front()
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.
@@ -291,7 +395,7 @@ impl Planner {
                 }
             }
             Motion::Waits { .. } | Motion::WaitsFor { .. } => self.half_blend_lu = 0.0,
-            Motion::Nothing => {}
+            Motion::Flows(_) | Motion::Nothing => {}
         }
     }
 
@@ -332,7 +436,7 @@ impl Planner {
             return REST;
         }
         let t_s = self.setpoint_period_s;
-        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.cap(t_s));
+        let junction = piece.corner.min(piece.motion.cap(t_s)).min(before.motion.exit_cap(t_s));
         let inside = piece.motion.highest_entry(if piece.rests_after { REST } else { exit });
         if inside.cap.velocity_lu_s < junction.velocity_lu_s {
             return inside;
@@ -365,7 +469,7 @@ impl Entry {
             }
             Motion::Waits { time_s } => (standstill(*time_s, Limit { kind: LimitKind::Dwell, axis: None }), STOP),
             // A wait for axes gets its time where it is handed out.
-            Motion::WaitsFor { .. } => (TimeLaw::new([]), STOP),
+            Motion::WaitsFor { .. } | Motion::Flows(_) => (TimeLaw::new([]), STOP),
             Motion::Nothing => (TimeLaw::new([]), ahead.min(entry)),
         }
     }
@@ -381,7 +485,15 @@ impl Motion {
             }),
             Self::Moves { limits, .. } => limits.cap,
             Self::Waits { .. } | Self::WaitsFor { .. } => STOP,
-            Self::Nothing => FREE,
+            Self::Flows(_) | Self::Nothing => FREE,
+        }
+    }
+
+    /// Highest speed at its end.
+    fn exit_cap(&self, setpoint_period_s: f64) -> SpeedCap {
+        match self {
+            Self::Moves { limits, block_length_lu: None, .. } => limits.exit_cap,
+            _ => self.cap(setpoint_period_s),
         }
     }
 
@@ -396,9 +508,22 @@ impl Motion {
                 Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }
             }
             Self::Waits { .. } | Self::WaitsFor { .. } => REST,
-            Self::Nothing => exit,
+            Self::Flows(_) | Self::Nothing => exit,
         }
     }
+}
+
+/// Pieces that one plan of the law `continuous` looks at, at most.
+const PLANNED_PIECES_MAX: usize = 4096;
+
+/// As [`check_motion`], under `continuous`.
+fn check_flow(flow: &Flow, length_lu: f64, path: &JointPath, blocked: Option<String>) -> Result<(), Box<Diagnostic>> {
+    let [first_lu_s, last_lu_s] = flow.ends_lu_s();
+    let numbers = [length_lu, first_lu_s, last_lu_s];
+    if blocked.is_none() && numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
+        return check_time(length_lu / first_lu_s.max(last_lu_s), path);
+    }
+    Err(no_speed(path, blocked))
 }
 
 /// A motion or wait longer than this is an alarm: 1e6 s are 11 days.
@@ -407,7 +532,12 @@ const PIECE_TIME_MAX_S: f64 = 1e6;
 /// The alarm of a motion whose length or limits are not numbers, or which takes for ever: without numbers there is no law, and to
 /// leave the piece out would make the axes jump over it. Checked machines and programs within their bounds do not give the first; a
 /// feed of 1e-7 mm/min or a position of 1e15 mm gives the second.
-fn check_motion(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
+fn check_motion(
+    limits: &PieceLimits,
+    length_lu: f64,
+    path: &JointPath,
+    blocked: Option<String>,
+) -> Result<(), Box<Diagnostic>> {
     let dynamics = &limits.bounds.dynamics;
     let numbers = [
         length_lu,
@@ -419,12 +549,18 @@ fn check_motion(limits: &PieceLimits, length_lu: f64, path: &JointPath) -> Resul
     if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
         return check_time(length_lu / limits.cap.velocity_lu_s, path);
     }
+    Err(no_speed(path, blocked))
+}
+
+fn no_speed(path: &JointPath, blocked: Option<String>) -> Box<Diagnostic> {
     let line = path.contour.block.line;
     let message = format!("the motion of line {line} has no speed that every axis allows");
-    Err(Box::new(
-        Diagnostic::error("P0001", message)
+    Box::new(match blocked {
+        Some(blocked) => Diagnostic::error("P0001", format!("{message}: {blocked}"))
+            .help("look at the limits of that axis in the machine file, with its dynamics sets"),
+        None => Diagnostic::error("P0001", message)
             .help("look for coordinates far outside the machine, or a circle of hardly any radius"),
-    ))
+    })
 }
 
 /// The alarm of a motion or wait that lasts `time_s` at least.

@@ -11,7 +11,7 @@
 
 use super::limits::{AxisRules, FeedCap};
 use super::worst::Worst;
-use crate::base::{AxisId, AxisVector};
+use crate::base::{AXES_MAX, AxisId, AxisVector, PerAxis};
 use crate::kinematics::{JointPath, JointState};
 
 /// What linear interpolation between neighbours may miss of a demand.
@@ -22,6 +22,9 @@ const RESERVE_RATIO: f64 = 1.03;
 
 /// A demand that would hold the speed to this many times the one that is held for other reasons does not bind.
 const UNBOUND_RATIO: f64 = 1.5;
+
+/// An axis with a smaller part of the path's derivative does not take part in it.
+const MOVES_MIN_RATIO: f64 = 1e-9;
 
 /// Intervals between two nodes of the curve to begin with, and how often one may be cut.
 const INTERVALS: usize = 4;
@@ -76,16 +79,22 @@ impl Scan {
         &self.places
     }
 
-    /// Greatest demands from one place to another, with the reserve for what lies between them.
-    pub(super) fn worst(&self, first: usize, last: usize) -> Worst {
+    /// Greatest demands from one place to another, with the reserve for what lies between them. With `path_of` every linear axis of it
+    /// that moves there has the acceleration and jerk of the whole path, not its share (`limits = "path"`).
+    pub(super) fn worst(&self, first: usize, last: usize, path_of: Option<&PerAxis<bool>>) -> Worst {
         let [mut d1, mut d2, mut d3] = [AxisVector::zero(); 3];
         for place in self.places.get(first..=last).unwrap_or(&[]) {
             let state = &place.state;
             for (most, next) in [(&mut d1, state.first), (&mut d2, state.second), (&mut d3, state.third)] {
-                for (most, next) in most.as_mut_slice().iter_mut().zip(next.as_slice()) {
+                let path = path_of.map(|linear| (linear, next.masked(linear).norm()));
+                for axis in AxisId::first(AXES_MAX) {
+                    let share = match path {
+                        Some((linear, whole)) if linear[axis] && next[axis].abs() > MOVES_MIN_RATIO * whole => whole,
+                        _ => next[axis].abs(),
+                    };
                     // A NaN stays, so that the planner refuses it.
-                    if next.abs() > *most || next.is_nan() {
-                        *most = next.abs();
+                    if share > most[axis] || share.is_nan() {
+                        most[axis] = share;
                     }
                 }
             }

@@ -46,7 +46,8 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
             if matches!(curve, Curve::Polynomial(_) | Curve::Quintic(_)) || !path.is_contour() =>
         {
             let scan = scan(rules, &path);
-            let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1)));
+            let path_of = rules.path_limits.then_some(&rules.linear);
+            let worst = Some(scan.worst(0, scan.places().len().saturating_sub(1), path_of));
             return vec![Part { path, worst }];
         }
         _ => return vec![Part { path, worst: None }],
@@ -62,11 +63,25 @@ pub(super) fn parts(rules: &AxisRules, path: JointPath) -> Vec<Part> {
         for stretch in stretches(rules, &smooth, &scan) {
             let places = scan.places();
             let (from_lu, to_lu) = (places[stretch.first].s_lu, places[stretch.last].s_lu);
-            let worst = Some(scan.worst(stretch.first, stretch.last));
+            let worst = Some(scan.worst(stretch.first, stretch.last, None));
             parts.push(Part { path: cut(&smooth, from_lu, to_lu), worst });
         }
     }
     named(parts, &path.contour, length_lu)
+}
+
+/// The parts of a piece between places where its direction or curvature steps, at least one.
+pub(super) fn smooth_parts(path: JointPath) -> Vec<Part> {
+    let PieceKind::Block(Curve::Polynomial(curve)) = &path.contour.kind else {
+        return vec![Part { path, worst: None }];
+    };
+    let (length_lu, breaks_lu) = (curve.length_lu(), curve.breaks_lu());
+    if breaks_lu.is_empty() {
+        return vec![Part { path, worst: None }];
+    }
+    let borders: Vec<f64> = [0.0].into_iter().chain(breaks_lu).chain([length_lu]).collect();
+    let part = |range: &[f64]| Part { path: cut(&path, range[0], range[1]), worst: None };
+    named(borders.windows(2).map(part).collect(), &path.contour, length_lu)
 }
 
 /// Gives the first part what begins with the block and the last what ends with it.
@@ -137,7 +152,7 @@ fn stretches(rules: &AxisRules, path: &JointPath, scan: &Scan) -> Vec<Stretch> {
             _ => stretches.push(Stretch { first: i, last: i + 1, speed_lu_s }),
         }
     }
-    let dynamics = PieceLimits::rough_dynamics(rules, &scan.worst(0, last));
+    let dynamics = PieceLimits::rough_dynamics(rules, &scan.worst(0, last, None));
     let way_lu = |from: &Stretch, to: &Stretch| dynamics.ramp_length_lu(from.speed_lu_s, to.speed_lu_s);
     while let Some(tightest) = tightest(&stretches, scan, &way_lu) {
         let gone = stretches.remove(tightest + 1);

@@ -2,10 +2,12 @@
 //!
 //! In: a [`PolynomialGeometry`]. Out: [`ArcLengthTable`]: the parameter cut into panels with their lengths.
 //!
-//! A panel is cut in two until eight Gauss-Legendre nodes on the whole and on its halves agree to [`PANEL_ERROR_RATIO`] of the
-//! length of the curve; the halves are what is kept. For a smooth integrand their error is the difference over 2^16, and where the
-//! speed |dq/du| has a zero it is a quarter of it, so that the error of the whole length is far below 1e-9 of it. The inverse is
-//! Newton's method inside the panel, held by a bracket.
+//! A panel is cut in two until eight Gauss-Legendre nodes on the whole and on its halves agree to [`PANEL_ERROR_RATIO`] of its length,
+//! or to [`FLOOR_RATIO`] of that of the curve where the speed |dq/du| has a zero. The halves are what is kept. For a smooth integrand
+//! their error is the difference over 2^16. Near a zero of the speed the differences fall slowly from one halving to the next, but they
+//! do not rise, and a parameter has not more than [`HALVINGS`]: so many times the sum of the differences bounds the error of the
+//! length ([`ArcLengthTable::error_max_lu`]), below 1e-9 of it. Tests compare with another quadrature. The inverse is Newton's method
+//! inside the panel, held by a bracket.
 //!
 //! Where the speed is 0 the curve has no direction: such a cusp is the border of two panels, and derivatives near it are taken a
 //! little beside it ([`Panel::safe_ratio`]), so that they are numbers. Positions are exact everywhere.
@@ -14,13 +16,22 @@
 
 use super::curve::DISPLACEMENT_MIN_LU;
 use super::quadrature::integral;
-use super::rational::{derivatives, speed};
+use super::rational::{derivatives, is_plain, speed};
 use crate::base::PerAxis;
 use crate::interpreter::{PolynomialGeometry, PolynomialPiece};
 use std::sync::Arc;
 
-/// Agreement of a panel with its halves, as share of the whole length.
+/// Agreement of a panel with its halves, as share of its length.
 const PANEL_ERROR_RATIO: f64 = 1e-11;
+
+/// The same as share of the length of the curve: enough for a panel whatever its length.
+const FLOOR_RATIO: f64 = 1e-13;
+
+/// A quotient knows the speed to the rounding of its coordinates only: differences below this share of them are noise.
+const NOISE_RATIO: f64 = 2.0 * f64::EPSILON;
+
+/// So often an interval can be halved before its ends are neighbours in f64.
+const HALVINGS: f64 = 52.0;
 
 /// Panels of one piece: more means a curve that no control would drive, such as one with poles.
 const PANELS_MAX: usize = 1024;
@@ -49,6 +60,8 @@ pub(super) struct Panel {
     pub ends_ratio: [f64; 2],
     /// Arc length where it begins and where it ends.
     pub lengths_lu: [f64; 2],
+    /// What its length may be off by.
+    error_lu: f64,
     /// |dq/du| at its ends.
     speeds_lu: [f64; 2],
     /// u between which derivatives exist.
@@ -66,6 +79,7 @@ pub(super) struct ArcLengthTable {
     panels: Vec<Panel>,
     rotary_only: bool,
     length_lu: f64,
+    error_max_lu: f64,
 }
 
 impl ArcLengthTable {
@@ -85,7 +99,9 @@ impl ArcLengthTable {
         counted: PerAxis<bool>,
         rotary_only: bool,
     ) -> Self {
-        let mut table = Self { geometry, linear: *linear, counted, panels: Vec::new(), rotary_only, length_lu: 0.0 };
+        let linear = *linear;
+        let (panels, length_lu, error_max_lu) = (Vec::new(), 0.0, 0.0);
+        let mut table = Self { geometry, linear, counted, panels, rotary_only, length_lu, error_max_lu };
         let rough_lu: Vec<f64> = table.geometry.pieces.iter().map(|piece| table.rough_length(piece)).collect();
         let total_lu: f64 = rough_lu.iter().sum();
         let mut length_lu = 0.0;
@@ -96,6 +112,7 @@ impl ArcLengthTable {
                         let own_lu = panel.lengths_lu[1];
                         panel.lengths_lu = [length_lu, length_lu + own_lu];
                         length_lu += own_lu;
+                        table.error_max_lu += panel.error_lu;
                         table.panels.push(panel);
                     }
                 }
@@ -109,6 +126,11 @@ impl ArcLengthTable {
     /// Arc length of all pieces.
     pub fn length_lu(&self) -> f64 {
         self.length_lu
+    }
+
+    /// What the length may be off by, rounding apart.
+    pub fn error_max_lu(&self) -> f64 {
+        self.error_max_lu
     }
 
     /// No linear axis moves: lengths are in rad.
@@ -219,15 +241,16 @@ impl ArcLengthTable {
             // Shorter than any motion. Where other axes move meanwhile, they would jump.
             return self.stands(piece).then(Vec::new);
         }
-        let error_max_lu = PANEL_ERROR_RATIO * total_lu;
+        let noise_lu = if is_plain(piece) { 0.0 } else { NOISE_RATIO * piece.numerator_lu[0].norm() };
+        let floor_lu = noise_lu.max(FLOOR_RATIO * total_lu);
         let mean = rough_lu / end;
-        let mut panels = self.cut(index, [0.0, end], error_max_lu)?;
+        let mut panels = self.cut(index, [0.0, end], floor_lu)?;
         let cusps = self.cusps(piece, &panels, mean);
         if !cusps.is_empty() {
             panels.clear();
             let borders: Vec<f64> = [0.0].into_iter().chain(cusps).chain([end]).collect();
             for range in borders.windows(2) {
-                panels.append(&mut self.cut(index, [range[0], range[1]], error_max_lu)?);
+                panels.append(&mut self.cut(index, [range[0], range[1]], floor_lu)?);
             }
         }
         self.keep_off_zeros(piece, &mut panels, mean);
@@ -246,7 +269,7 @@ impl ArcLengthTable {
     }
 
     /// Cuts a range of u until the quadrature has converged.
-    fn cut(&self, index: usize, range: [f64; 2], error_max_lu: f64) -> Option<Vec<Panel>> {
+    fn cut(&self, index: usize, range: [f64; 2], floor_lu: f64) -> Option<Vec<Panel>> {
         let piece = &self.geometry.pieces[index];
         let mut panels = Vec::new();
         let mut waiting = vec![(range, self.length_between(piece, range[0], range[1]))];
@@ -258,7 +281,7 @@ impl ArcLengthTable {
             if !error_lu.is_finite() || panels.len() + waiting.len() > PANELS_MAX {
                 return None;
             }
-            if error_lu > error_max_lu {
+            if error_lu > floor_lu.max(PANEL_ERROR_RATIO * (left_lu + right_lu)) {
                 waiting.push(([middle, to], right_lu));
                 waiting.push(([from, middle], left_lu));
                 continue;
@@ -266,7 +289,14 @@ impl ArcLengthTable {
             for (ends_ratio, own_lu) in [([from, middle], left_lu), ([middle, to], right_lu)] {
                 let speeds_lu = ends_ratio.map(|u| self.speed(piece, u));
                 let lengths_lu = [0.0, own_lu];
-                panels.push(Panel { piece: index, ends_ratio, lengths_lu, speeds_lu, safe_ratio: range });
+                panels.push(Panel {
+                    piece: index,
+                    ends_ratio,
+                    lengths_lu,
+                    error_lu: 0.5 * HALVINGS * error_lu,
+                    speeds_lu,
+                    safe_ratio: range,
+                });
             }
         }
         Some(panels)

@@ -21,13 +21,16 @@
 
 use super::CurveState;
 use super::quadrature::integral;
-use crate::base::{AxisVector, PartPoint};
+use crate::base::{AxisId, AxisVector, PartPoint};
 
 /// Panels in half of the parameter range.
 const PANELS: usize = 8;
 
 /// Below this |V-U| or |V+U| the bisectors are rounding errors.
 const BISECTOR_MIN_RATIO: f64 = 1e-9;
+
+/// An axis with less of both bisectors does not move: it is the rounding of the directions.
+const DIRECTION_MIN_RATIO: f64 = 1e-12;
 
 /// Corner rounded by a cubic Hermite curve.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,6 +138,11 @@ impl HermiteBlend {
     /// theta, the turning angle: 0 = straight.
     pub fn angle_rad(&self) -> f64 {
         2.0 * self.shape.sin_ratio.atan2(self.shape.cos_ratio)
+    }
+
+    /// True for the axes that span the plane of the blend.
+    pub fn moves(&self, axis: AxisId) -> bool {
+        self.along[axis].abs().max(self.inward[axis].abs()) > DIRECTION_MIN_RATIO
     }
 
     /// The shape at u, clamped to [0, 1]; u counts over the whole blend, trimmed or not.

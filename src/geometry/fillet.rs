@@ -181,7 +181,7 @@ impl PlaneArc {
             return Err(NoFillet::NoChord);
         }
         let diameter_mm = 2.0 * radius_mm;
-        if !(chord_mm <= diameter_mm * SAME_LENGTH_RATIO) {
+        if chord_mm > diameter_mm * SAME_LENGTH_RATIO || diameter_mm.is_nan() {
             return Err(NoFillet::ChordTooLong { chord_mm, diameter_mm });
         }
         let half_sine = (chord_mm / diameter_mm).min(1.0);

@@ -72,6 +72,11 @@ impl PolynomialCurve {
         self.length_lu
     }
 
+    /// What the arc length of the whole may be off by, rounding apart.
+    pub fn length_error_max_lu(&self) -> f64 {
+        self.table.error_max_lu()
+    }
+
     /// True where no linear axis moves: lengths are then in rad.
     pub fn rotary_only(&self) -> bool {
         self.table.rotary_only()
@@ -108,6 +113,12 @@ impl PolynomialCurve {
     pub fn nodes_lu(&self) -> impl Iterator<Item = f64> {
         let borders = self.own_panels().iter().map(|panel| panel.lengths_lu[0] - self.offset_lu);
         borders.filter(|s_lu| *s_lu > 0.0 && *s_lu < self.length_lu)
+    }
+
+    /// Places inside where one polynomial ends and the next begins, in order.
+    pub fn knots_lu(&self) -> impl Iterator<Item = f64> {
+        let pairs = self.own_panels().windows(2).filter(|pair| pair[0].piece != pair[1].piece);
+        pairs.map(|pair| pair[1].lengths_lu[0] - self.offset_lu)
     }
 
     /// Places inside where the direction or the curvature steps, in order.

@@ -10,8 +10,8 @@
 use super::overlay::Overlay;
 use super::{AxisSetpoint, PathSample, Setpoint};
 use crate::base::{AxisVector, PerAxis, TimeBase};
-use crate::feed::{Limit, LimitKind, PathState, PlannedPiece};
-use crate::interpreter::{Event, ExactStop, Feed};
+use crate::feed::{Limit, LimitKind, PathState, PlannedPiece, ProgrammedTime};
+use crate::interpreter::{Event, ExactStop};
 use crate::machine::{Machine, PathMode};
 use crate::program::BlockRef;
 use crate::smoothing::{Corner, PieceKind};
@@ -34,6 +34,7 @@ pub struct Interpolator {
     ended: bool,
     /// Axes on their own way.
     overlay: Overlay,
+    programmed: ProgrammedTime,
 }
 
 /// A piece that began in the cycle that was sampled last.
@@ -55,12 +56,12 @@ pub struct Begun {
     pub corner: Option<Corner>,
     /// Path speed at its start.
     pub entry_feed_lu_s: f64,
-    /// Programmed feed; `None` for rapids and waits.
+    /// Programmed feed along the path (under FGROUP: at which the group has F); `None` for rapids and waits.
     pub programmed_feed_lu_s: Option<f64>,
+    /// Time at the programmed feed, rapids at the velocities of the axes, waits as they are.
+    pub programmed_time_s: f64,
     /// Path length; 0 for a wait.
     pub length_lu: f64,
-    /// From its start to its end, per axis.
-    pub displacement_lu: AxisVector,
     /// The `_lu` here are rad: no linear axis moves.
     pub rotary_only: bool,
     /// Time of its law.
@@ -74,6 +75,7 @@ pub struct Begun {
 #[derive(Clone, Debug)]
 struct Active {
     piece: PlannedPiece,
+    programmed_feed_lu_s: Option<f64>,
     length_lu: f64,
     rotary_only: bool,
     /// Tick number at or after its start, and how long after (a piece that takes no time: or a rounding error before it).
@@ -94,6 +96,7 @@ impl Interpolator {
             begun: Vec::with_capacity(BEGUN_USUAL),
             ended: false,
             overlay: Overlay::new(machine),
+            programmed: ProgrammedTime::new(machine),
         }
     }
 
@@ -172,8 +175,8 @@ impl Interpolator {
         for motion in piece.positionings.drain(..) {
             self.overlay.set_out(motion, k, carry_s);
         }
-        let programmed_feed_lu_s = programmed_feed_lu_s(&piece);
-        let displacement_lu = piece.path.displacement_lu();
+        let programmed_feed_lu_s = self.programmed.feed_lu_s(&piece.path);
+        let programmed_time_s = self.programmed.time_s(&piece.path).unwrap_or(piece.law.duration_s());
         let contour = &mut piece.path.contour;
         let events = std::mem::take(&mut contour.events);
         let corner = match &contour.kind {
@@ -192,15 +195,16 @@ impl Interpolator {
             corner,
             entry_feed_lu_s: piece.law.at(0.0).velocity_lu_s,
             programmed_feed_lu_s,
+            programmed_time_s,
             length_lu,
-            displacement_lu,
             rotary_only,
             duration_s: piece.law.duration_s(),
             before_tick_s: carry_s.max(0.0),
             path_length_mm: self.path_length_mm,
         });
         let path_length_mm = self.path_length_mm;
-        self.active = Some(Active { piece, length_lu, rotary_only, entry_k: k, carry_s, path_length_mm });
+        self.active =
+            Some(Active { piece, programmed_feed_lu_s, length_lu, rotary_only, entry_k: k, carry_s, path_length_mm });
     }
 
     fn setpoint(&self, k: u64, active: &Active, state: PathState) -> Setpoint {
@@ -227,7 +231,7 @@ impl Interpolator {
                 block: contour.block,
                 path_length_mm: active.path_length_mm + linear_mm,
                 feed_lu_s: v,
-                programmed_feed_lu_s: programmed_feed_lu_s(&active.piece),
+                programmed_feed_lu_s: active.programmed_feed_lu_s,
                 acceleration_lu_s2: a,
                 jerk_lu_s3: j,
                 limit: state.limit,
@@ -252,14 +256,4 @@ impl Active {
 /// A wait of 0 s: a function block.
 fn takes_no_time(piece: &PlannedPiece) -> bool {
     piece.path.contour.curve().is_none() && piece.law.duration_s() == 0.0
-}
-
-/// F of a piece that moves with one.
-fn programmed_feed_lu_s(piece: &PlannedPiece) -> Option<f64> {
-    let contour = &piece.path.contour;
-    match (&contour.kind, &contour.feed) {
-        (PieceKind::Wait { .. } | PieceKind::WaitPositioned { .. }, _) | (_, Feed::Rapid) => None,
-        (_, Feed::Path { feed_lu_s }) => Some(*feed_lu_s),
-        (_, Feed::Varying { feeds_lu_s }) => feeds_lu_s.first().copied(),
-    }
 }

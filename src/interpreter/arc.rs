@@ -69,7 +69,8 @@ fn full_circle(arc: &ProgrammedArc, centre_mm: [f64; 2], columns: &Columns) -> O
     let radius_mm = distance(arc.start_mm, centre_mm);
     if radius_mm <= SAME_POINT_MM {
         return Err(Fault::new(codes::ARC_WITHOUT_CENTRE, columns.clone(), "the centre of this arc is its start")
-            .label("radius 0"));
+            .label("radius 0")
+            .help("I, J and K lead from the start to the centre: give the one that is missing, or CR"));
     }
     let turns = TAU * f64::from(arc.extra_turns + 1);
     let sweep_rad = if arc.counter_clockwise { turns } else { -turns };
@@ -97,9 +98,9 @@ fn centre_from_radius(arc: &ProgrammedArc, radius_mm: f64, chord_mm: f64, column
     let half_mm = chord_mm / 2.0;
     if radius_mm.abs() < half_mm - RADIUS_TOLERANCE_MM || radius_mm == 0.0 {
         let message = format!("radius {} mm does not reach the end: half the way is {half_mm:.3} mm", radius_mm.abs());
-        return Err(
-            Fault::new(codes::ARC_RADIUS, columns.clone(), message).label(format!("expected at least {half_mm:.3}"))
-        );
+        return Err(Fault::new(codes::ARC_RADIUS, columns.clone(), message)
+            .label(format!("expected at least {half_mm:.3}"))
+            .help("check the end point and CR: the circle must reach from start to end"));
     }
     let height_mm = (radius_mm * radius_mm - half_mm * half_mm).max(0.0).sqrt();
     let (middle, normal) = bisector(arc);

@@ -388,7 +388,8 @@ fn positive_feed(typed: Typed, columns: &Columns) -> Outcome<()> {
         return Ok(());
     }
     Err(Fault::new(codes::BAD_FEED, columns.clone(), format!("feed {} is not possible", typed.0))
-        .label(format!("expected {FEED_MIN} or more")))
+        .label(format!("expected {FEED_MIN} or more"))
+        .help("no feed moves nothing: write a feed above 0, G0 for a rapid, or M0 to stop"))
 }
 
 /// A percentage above 0, as a share.
@@ -397,7 +398,8 @@ fn percent(value_percent: f64, most_percent: f64, columns: &Columns) -> Outcome<
         return Ok(value_percent / 100.0);
     }
     Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{value_percent} % is not possible"))
-        .label(format!("expected more than 0 and at most {most_percent} %")))
+        .label(format!("expected more than 0 and at most {most_percent} %"))
+        .help(format!("give 1 to {most_percent} %: with 0 the path would stand for ever")))
 }
 
 fn within(value: f64, [low, high]: [f64; 2], unit: &str, columns: &Columns) -> Outcome<f64> {

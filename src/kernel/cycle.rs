@@ -144,7 +144,7 @@ impl<S: PieceSource> Kernel<S> {
             drives: stages,
             kinematics,
             contour_error: ContourErrorMeter::new(),
-            figures: Figures::new(&machine),
+            figures: Figures::default(),
             ahead: Sampled { setpoint: None, begun: Vec::with_capacity(BEGUN_USUAL) },
             output,
             next_setpoint: 0,

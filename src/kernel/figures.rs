@@ -8,7 +8,7 @@ use crate::drive::AxisSignals;
 use crate::feed::Limit;
 use crate::interpolator::{Begun, Setpoint};
 use crate::interpreter::ExactStop;
-use crate::machine::{Machine, PathMode};
+use crate::machine::PathMode;
 use crate::program::BlockRef;
 use crate::smoothing::Corner;
 
@@ -28,7 +28,7 @@ pub struct Figures {
     pub blocks: u64,
     /// Executed path of the linear axes, rapids included.
     pub path_length_mm: f64,
-    /// Time at programmed feed: length/F of every piece, rapids at the axes' limits, dwells as programmed.
+    /// Time at programmed feed: length/F of every piece (with FGROUP and OVR), rapids at the axes' limits, dwells as programmed.
     pub cam_time_s: f64,
     /// Set-points within 0.1 % of the programmed F.
     pub at_programmed_feed: u64,
@@ -42,7 +42,6 @@ pub struct Figures {
     pub exact_stops: u64,
     /// Per axis.
     pub axes: PerAxis<AxisFigures>,
-    rapid_velocity_lu_s: PerAxis<f64>,
 }
 
 /// Figures of one axis; `lu` is mm or rad.
@@ -86,13 +85,9 @@ impl PeakAndSquares {
     }
 }
 
-impl Figures {
+impl Default for Figures {
     /// All zero.
-    pub fn new(machine: &Machine) -> Self {
-        let mut rapid_velocity_lu_s = PerAxis::splat(f64::INFINITY);
-        for axis in machine.axis_ids() {
-            rapid_velocity_lu_s[axis] = machine.axis(axis).limits.velocity_max_lu_s;
-        }
+    fn default() -> Self {
         Self {
             setpoints: 0,
             blocks: 0,
@@ -104,10 +99,11 @@ impl Figures {
             corners_total: 0,
             exact_stops: 0,
             axes: PerAxis::default(),
-            rapid_velocity_lu_s,
         }
     }
+}
 
+impl Figures {
     /// Counts a piece that begins.
     pub(super) fn piece(&mut self, begun: &Begun) {
         self.blocks += u64::from(begun.blocks_begun);
@@ -116,23 +112,13 @@ impl Figures {
         if !begun.rotary_only {
             self.path_length_mm += begun.length_lu;
         }
-        self.cam_time_s += match begun.programmed_feed_lu_s {
-            _ if begun.length_lu == 0.0 => begun.duration_s,
-            Some(feed_lu_s) => begun.length_lu / feed_lu_s,
-            None => self.rapid_time_s(begun),
-        };
+        self.cam_time_s += begun.programmed_time_s;
         if let Some(corner) = begun.corner {
             self.corners_total += 1;
             if self.corners.len() < CORNERS_LISTED {
                 self.corners.push((begun.block, corner, begun.entry_feed_lu_s));
             }
         }
-    }
-
-    /// A rapid at the velocity of the axis that takes longest.
-    fn rapid_time_s(&self, begun: &Begun) -> f64 {
-        let travel = begun.displacement_lu.as_slice().iter();
-        travel.zip(self.rapid_velocity_lu_s.as_slice()).map(|(way, velocity)| way.abs() / velocity).fold(0.0, f64::max)
     }
 
     /// Counts a set-point; number 0 is the start posture and takes no time.

@@ -132,7 +132,7 @@ impl<'a> Follower<'a> {
             machine,
             kinematics: Kinematics::new(machine),
             drives: machine.axis_ids().map(|id| Drive::new(machine.axis(id), time_base, start, sent[id])).collect(),
-            figures: Figures::new(machine),
+            figures: Figures::default(),
             sent,
             actual: sent,
             setpoints: PerAxis::default(),

@@ -14,6 +14,7 @@ mod run;
 mod setpoint_table;
 mod summary;
 mod threads;
+mod what_if;
 
 pub use cycle::{AxisRow, CycleOutput, Kernel, Status};
 pub use figures::Figures;
@@ -22,3 +23,4 @@ pub use preparation::{Findings, PieceSource, Preparation};
 pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
 pub use setpoint_table::SetpointTable;
 pub use summary::{CornerSummary, RunSummary, Warning};
+pub use what_if::{Saving, WhatIf, what_if};

@@ -6,7 +6,7 @@
 
 use crate::base::{Diagnostic, TimeBase};
 use crate::feed::{PlannedPiece, Planner};
-use crate::interpreter::{Interpreter, MainRun, MoveKind, Setup};
+use crate::interpreter::{Interpreter, MainRun, Move, MoveKind, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
 use crate::smoothing::{ContourPiece, Smoother};
@@ -45,6 +45,8 @@ pub struct Preparation {
     time_base: TimeBase,
     /// The interpreter waits for the time at which the path rests.
     stopped: bool,
+    /// What the interpreter made of the program since the last call of `take_moves`; `None`: not kept.
+    moves: Option<Vec<Move>>,
 }
 
 impl Preparation {
@@ -60,7 +62,18 @@ impl Preparation {
             finished: false,
             time_base: machine.cycle.time_base,
             stopped: false,
+            moves: None,
         }
+    }
+
+    /// Keeps the moves, for those who want to plan them again.
+    pub(super) fn keeping_moves(self) -> Self {
+        Self { moves: Some(Vec::new()), ..self }
+    }
+
+    /// The moves since the last call.
+    pub(super) fn take_moves(&mut self) -> Vec<Move> {
+        self.moves.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// Executes one more block of the program and plans what follows from it.
@@ -70,6 +83,9 @@ impl Preparation {
         }
         let moved = self.interpreter.next_move();
         self.stopped = matches!(&moved, Ok(Some(next)) if next.kind == MoveKind::StopPreparation);
+        if let (Some(moves), Ok(Some(next))) = (&mut self.moves, &moved) {
+            moves.push(next.clone());
+        }
         let Self { smoother, kinematics, planner, .. } = self;
         let mut refused = None;
         let mut plan = |piece: ContourPiece| {
@@ -118,9 +134,17 @@ impl PieceSource for Preparation {
     fn next_piece(&mut self) -> Option<PlannedPiece> {
         loop {
             if let Some(piece) = self.planner.pop() {
+                if let Some((block, alarm)) = self.planner.take_alarm() {
+                    self.alarm = Some(self.smoother.marked(alarm, block));
+                    self.finished = true;
+                    self.planner.finish();
+                }
                 return Some(piece);
             }
             if self.finished {
+                if let Some((block, warning)) = self.planner.take_warning() {
+                    self.warnings.push(self.smoother.marked(warning, block));
+                }
                 return None;
             }
             self.extend();

@@ -19,6 +19,11 @@ impl JointPath {
         self.contour.curve().map_or(0.0, |curve| curve.length_lu())
     }
 
+    /// True where every axis moves in proportion to s: the derivatives are the same all along.
+    pub fn is_straight(&self) -> bool {
+        self.is_contour() && matches!(self.contour.curve(), Some(Curve::Line(_)))
+    }
+
     /// Posture and derivatives at s, clamped to the ends of the piece.
     pub fn at(&self, s_lu: f64) -> JointState {
         let mut state = self.tip_at(s_lu);

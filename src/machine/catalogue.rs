@@ -112,14 +112,14 @@ const FEED: &[Key] = &[
         "",
         Choice(words::<CurvatureJump>),
         Word("signed"),
-        "transition feed between arcs: curvature with its sense, or as printed",
+        "transition feed between arcs: from the difference of the curvatures with their sense, or of their amounts, as printed",
     ),
     Key::new(
         "arc_limits",
         "",
         Choice(words::<ArcLimits>),
         Word("worst"),
-        "feed limits of an arc: worst direction met, or that at the entry, as printed",
+        "feed limits of an arc: worst direction met, with the shares R_A and R_J, or as printed: all of A in the direction of the entry",
     ),
 ];
 
@@ -175,10 +175,16 @@ const SMOOTHING: &[Key] = &[
         "",
         Choice(words::<BlendLaw>),
         Word("limits"),
-        "feed inside a blend: all limits hold, the entry feed is held, or the printed loop",
+        "feed inside a blend: all limits hold, the entry feed is held, or the printed loop, which breaks its own limits (counted in a warning)",
     ),
     Key::new("shape", "", Choice(words::<BlendShape>), Word("hermite3"), "curve of a blend"),
-    Key::new("limits", "", Choice(words::<BlendLimits>), Word("axis"), "limits of a blend: per axis, or of the path"),
+    Key::new(
+        "limits",
+        "",
+        Choice(words::<BlendLimits>),
+        Word("axis"),
+        "limits of a blend: per axis, or of the path, whatever its direction: the least of the axes that move in it",
+    ),
     Key::new(
         "orientation_tolerance_deg",
         "deg",

@@ -139,7 +139,7 @@ fn check(root: &Node, texts: &Texts) -> (Option<Machine>, Vec<Diagnostic>) {
     if !failed {
         for later in later_values(&machine) {
             let node = root.at(&[later.table, later.key]).unwrap_or(root);
-            findings.report(&node.mark, "not available yet", later.warning());
+            findings.report(&node.mark, "not under this time law", later.warning());
         }
     }
     let list = findings.into_sorted();

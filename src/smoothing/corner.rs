@@ -9,7 +9,7 @@
 //! | G641 | corners | ADIS or ADISPOS of both blocks | as G642 |
 //! | G642 | corners | beta times CTOL, no axis further than its ATOL | models/local-smoothing.md section 1 [Essid 2019] |
 //! | G643 | corners | every axis over its own range, as its ATOL or CTOL allows | polynomials, one range an axis |
-//! | G644 | corners | as far as the machine's axis tolerance allows, CTOL and ATOL do not count | one polynomial |
+//! | G644 | corners | until the axes can pass at the feed (`dynamics`), as far as the machine's axis tolerance allows; CTOL and ATOL do not count | one polynomial |
 //! | G645 | as G642, and tangential joints with a step of curvature | there: `transition_tolerance_mm` | as G642; a polynomial |
 //!
 //! With `shape = "quintic"` the blend of G641, G642 and G645 between lines is one without a step of curvature, and rotary axes go along
@@ -20,11 +20,13 @@
 //! Does not cut the blocks: that is the smoother's.
 
 use super::Corner;
-use super::transition::{Pair, Tolerances, Transition, common, per_axis};
+use super::dynamics::Dynamics;
+use super::transition::{Pair, Tolerances, Transition, common, enough, per_axis};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Curve, CurveState, DISPLACEMENT_MIN_LU, HermiteBlend, Line, QuinticShape};
 use crate::interpreter::{Feed, Modes};
 use crate::machine::{BlendShape, Machine, PathMode, SmoothingSettings};
+use std::sync::Arc;
 
 /// Turning angles below this are rounding of programmed points: no blend and no `corners` entry.
 pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
@@ -33,6 +35,9 @@ pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
 /// 0.6 cos² T / sin: here 6e-5 T, a few nanometres for a usual T, so that the blend cannot be told from the cusp into which it
 /// degenerates, and crossing it at the speed that its curvature allows lasts longer than the stop.
 const REVERSAL_COS_MIN: f64 = 0.01;
+
+/// cos(theta/2) below which a polynomial that carries rotary axes is compared with a stop (turning angles above 139 deg).
+const SHARP_COS_MAX: f64 = 0.35;
 
 /// Direction cosines below this are rounding of coordinates: such an axis neither moves nor reverses.
 const DIRECTION_MIN_RATIO: f64 = 1e-9;
@@ -72,11 +77,13 @@ pub(super) enum Junction {
 pub(super) struct Rules {
     settings: SmoothingSettings,
     linear: PerAxis<bool>,
+    machine: Arc<Machine>,
 }
 
 impl Rules {
     pub(super) fn new(machine: &Machine) -> Self {
-        Self { settings: machine.smoothing.clone(), linear: machine.linear_mask() }
+        let (settings, linear) = (machine.smoothing.clone(), machine.linear_mask());
+        Self { settings, linear, machine: Arc::new(machine.clone()) }
     }
 
     /// Axes whose travel counts as path length.
@@ -130,13 +137,10 @@ impl Rules {
         let joined = match (mode, lines, linear_only) {
             (PathMode::G643 | PathMode::G644, ..) | (_, _, None) if apart => Some(Junction::Pass),
             (PathMode::G643, Some(lines), _) => self.block_internal(lines, before, after, angle_rad, &room),
-            (PathMode::G644, ..) => {
-                let tolerances = self.machine_tolerances();
-                self.polynomial(before, after, angle_rad, &room, &tolerances)
-            }
             (_, Some(lines), _) if self.settings.shape == BlendShape::Quintic && self.has_corner(&u, &v) => {
                 self.quintic(lines, before, after, angle_rad, &room)
             }
+            (PathMode::G644, ..) => self.dynamic(before, after, angle_rad, &room, [&u, &v]),
             (_, _, Some(lines)) => Some(self.published(lines, before, after, angle_rad, &room)),
             _ => self.general(before, after, angle_rad, &room, [&u.first, &v.first]),
         };
@@ -172,17 +176,38 @@ impl Rules {
     ) -> Option<Junction> {
         let [u, v] = lines.map(Line::direction);
         let shape = QuinticShape::new(u, v, &self.linear)?;
-        let wanted_lu = if before.modes.path_mode == PathMode::G641 {
-            self.rounding_distance_mm(before, after)
-        } else {
-            let tolerances = self.contour_tolerances(before, after, [u, v]);
+        let within = |tolerances: &Tolerances| {
             1.0 / tolerances.share(&(*shape.inward() * shape.deviation_ratio()), &self.linear)
+        };
+        let wanted_lu = match before.modes.path_mode {
+            PathMode::G641 => self.rounding_distance_mm(before, after),
+            PathMode::G644 => {
+                let [second, third] = shape.greatest_bends();
+                let dynamics = Dynamics::new(&self.machine, before, after, lines.map(|line| line.at(0.0)).each_ref());
+                dynamics.needed_lu(&second, &third).min(within(&self.machine_tolerances()))
+            }
+            _ => within(&self.contour_tolerances(before, after, [u, v])),
         };
         let t = room.clamped(wanted_lu);
         let blend = shape.blend(lines[0].end(), t)?;
         // Of the clamped T, so that the tolerance only gets smaller.
         let tolerance_mm = t * shape.deviation_ratio();
         Some(Junction::Blend(Curve::Quintic(blend), Corner { angle_rad, tolerance_mm, transition_length_mm: t }))
+    }
+
+    /// G644: as far as the axes need, as their tolerances allow.
+    fn dynamic(
+        &self,
+        before: &Side<'_>,
+        after: &Side<'_>,
+        angle_rad: f64,
+        room: &Room,
+        ends: [&CurveState; 2],
+    ) -> Option<Junction> {
+        let dynamics = Dynamics::new(&self.machine, before, after, ends);
+        let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
+        let room = room.up_to(enough(&pair, room.clamped(f64::INFINITY), &dynamics));
+        self.polynomial(before, after, angle_rad, &room, &self.machine_tolerances())
     }
 
     /// G643 between lines.
@@ -237,6 +262,14 @@ impl Rules {
         let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
         let t_max_lu = room.clamped(f64::INFINITY);
         let blend = common(&pair, t_max_lu, tolerances, |t| cuts(before, after, t, room.free_lu))?;
+        let (u, v) = (before.curve.at(f64::INFINITY), after.curve.at(0.0));
+        let [along, onward] = [u.first, v.first].map(|direction| direction.masked(&self.linear));
+        // The tip almost turns back: what rotary axes have to do on the way is pressed into almost no length.
+        let carries = u.first != along || v.first != onward;
+        let sharp = carries && (turning_angle(&along, &onward) / 2.0).cos() < SHARP_COS_MAX;
+        if sharp && Dynamics::new(&self.machine, before, after, [&u, &v]).stop_is_quicker(&blend.curve) {
+            return Some(Junction::Stop);
+        }
         Some(blended(blend, angle_rad))
     }
 

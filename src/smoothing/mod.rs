@@ -4,6 +4,7 @@
 
 mod compressor;
 mod corner;
+mod dynamics;
 mod insert;
 mod smoother;
 mod transition;

@@ -433,7 +433,7 @@ impl Head {
 }
 
 /// The lower of two feeds.
-fn lower(first: &Feed, second: &Feed) -> Feed {
+pub(super) fn lower(first: &Feed, second: &Feed) -> Feed {
     let near = |feed: &Feed, last: bool| match feed {
         Feed::Rapid => None,
         Feed::Path { feed_lu_s } => Some(*feed_lu_s),

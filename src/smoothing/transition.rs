@@ -11,8 +11,11 @@
 //! [`common`] blends all axes over one T. [`per_axis`] (lines only) gives every axis the T_j that its own tolerance allows: the axes
 //! leave their lines at different places.
 //!
+//! [`enough`] is the T beyond which a longer blend does not make the corner faster.
+//!
 //! Does not know path modes: that is `corner`.
 
+use super::dynamics::{Dynamics, LENGTH_MIN_LU};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Curve, Line, PolynomialCurve};
 use crate::interpreter::{PolynomialGeometry, PolynomialPiece};
@@ -33,6 +36,12 @@ const STRETCH_MIN_RATIO: f64 = 1e-9;
 
 /// Deviation in the middle of a blend between lines, over T |V - U|.
 const MIDDLE_RATIO: f64 = 3.0 / 16.0;
+
+/// Greatest second and third derivative of a blend between lines, over |V - U|/T and |V - U|/T².
+const BEND_RATIOS: [f64; 2] = [0.75, 1.5];
+
+/// Rounds of the search for the T that the dynamics need.
+const DYNAMICS_ROUNDS: usize = 12;
 
 /// What axes may deviate by.
 #[derive(Clone, Copy, Debug)]
@@ -102,6 +111,31 @@ impl Pair<'_> {
         }
         greatest
     }
+}
+
+/// The shortest T up to `t_max_lu` at which the axes can pass at the feed; `t_max_lu` where there is none.
+pub(super) fn enough(pair: &Pair<'_>, t_max_lu: f64, dynamics: &Dynamics) -> f64 {
+    if let (Curve::Line(first), Curve::Line(second)) = (pair.before, pair.after) {
+        let turn = *second.direction() - *first.direction();
+        let [second, third] = BEND_RATIOS.map(|ratio| turn * ratio);
+        return dynamics.needed_lu(&second, &third).min(t_max_lu);
+    }
+    let passes = |t_lu: f64| {
+        let polynomial = pair.polynomial(t_lu);
+        (0..=SAMPLES).all(|i| {
+            let [second, third] = bends(&polynomial, 2.0 * t_lu * i as f64 / SAMPLES as f64);
+            dynamics.share(&second, &third) <= 1.0
+        })
+    };
+    if !passes(t_max_lu) {
+        return t_max_lu;
+    }
+    let (mut low, mut high) = (LENGTH_MIN_LU.min(t_max_lu), t_max_lu);
+    for _ in 0..DYNAMICS_ROUNDS {
+        let middle = 0.5 * (low + high);
+        if passes(middle) { high = middle } else { low = middle }
+    }
+    high
 }
 
 /// The blend over the largest T up to `t_max_lu` that keeps the tolerances. `None`: there is none. `ends` gives the exact points
@@ -237,6 +271,13 @@ fn hermite_one(h: f64, [p, m, a]: [f64; 3], [q, n, b]: [f64; 3]) -> [f64; 6] {
 
 fn value(coefficients: &[AxisVector; 6], u: f64) -> AxisVector {
     coefficients.iter().rev().fold(AxisVector::zero(), |sum, coefficient| sum * u + *coefficient)
+}
+
+/// Second and third derivative to u.
+fn bends(c: &[AxisVector; 6], u: f64) -> [AxisVector; 2] {
+    let second = c[2] * 2.0 + (c[3] * 6.0 + (c[4] * 12.0 + c[5] * (20.0 * u)) * u) * u;
+    let third = c[3] * 6.0 + (c[4] * 24.0 + c[5] * (60.0 * u)) * u;
+    [second, third]
 }
 
 /// Coefficients of p(u + by).

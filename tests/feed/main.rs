@@ -1,7 +1,11 @@
 //! Tests of the room `feed`: closed forms, published figures, limits seen from outside.
 
+mod blocked;
+mod circular_contours;
 mod curves;
+mod printed_loop;
 mod profile;
+mod programmed_time;
 mod published;
 mod sampled;
 mod support;

@@ -23,6 +23,11 @@ pub fn spinner() -> Machine {
     with_axes(&["X", "Y", "Z"])
 }
 
+/// A shipped machine.
+pub fn test_machine_shipped(name: &str) -> Machine {
+    test_machine::shipped(name, &[])
+}
+
 fn with_axes(axes: &[&str]) -> Machine {
     let mut machine = test_machine::with_axes(axes, &[]);
     // Without drives a machine has one tick a set-point; four leave room for a position cycle.

@@ -329,17 +329,15 @@ fn dynamics_sets_are_kept() {
 }
 
 #[test]
-fn values_of_later_versions_are_refused_by_name() {
+fn published_models_under_the_continuous_law_are_refused_by_name() {
     let later = [
-        ("time_law = \"continuous\"", "time_law = \"continuous\"", "feed.time_law"),
-        ("\"signed\"", "\"printed\"", "feed.curvature_jump = \"printed\""),
         ("\"worst\"", "\"printed\"", "feed.arc_limits = \"printed\""),
         ("blend_law = \"limits\"", "blend_law = \"published\"", "smoothing.blend_law = \"published\""),
+        ("blend_law = \"limits\"", "blend_law = \"entry\"", "smoothing.blend_law = \"entry\""),
         ("limits = \"axis\"", "limits = \"path\"", "smoothing.limits = \"path\""),
     ];
-    let now = with(EXAMPLE, "time_law = \"continuous\"", "time_law = \"seven-phase\"");
     for (from, to, name) in later {
-        let text = if from == to { EXAMPLE.to_owned() } else { with(&now, from, to) };
+        let text = with(EXAMPLE, from, to);
         let loaded = parse(&text).unwrap_or_else(|found| panic!("{}", shown(&found)));
         assert_eq!(loaded.warnings.len(), 1);
         assert_eq!(loaded.warnings[0].severity, Severity::Warning);
@@ -347,9 +345,11 @@ fn values_of_later_versions_are_refused_by_name() {
         let refused = machine::unsupported(&loaded.machine);
         assert!(refused.len() == 1 && refused[0].severity == Severity::Error && refused[0].message.contains(name));
         assert!(refused[0].help.is_some());
+        let now = with(&text, "time_law = \"continuous\"", "time_law = \"seven-phase\"");
+        assert_eq!(machine::unsupported(&parse(&now).expect("a machine").machine), []);
     }
     for mode in ["G60", "G64", "G641", "G642"] {
-        let machine = parse(&with(&now, "\"G642\"", &format!("\"{mode}\""))).expect(mode).machine;
+        let machine = parse(&with(EXAMPLE, "\"G642\"", &format!("\"{mode}\""))).expect(mode).machine;
         assert_eq!(machine::unsupported(&machine), [], "{mode}");
     }
 }

@@ -4,6 +4,7 @@
 #![allow(dead_code)]
 
 /// xorshift64*.
+#[derive(Clone)]
 pub struct Random(u64);
 
 impl Random {

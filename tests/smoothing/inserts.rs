@@ -243,3 +243,142 @@ fn corners_without_place_stay_as_they_are() {
     let (pieces, mut smoother) = run(&machine(), &moves);
     assert_eq!((pieces.len(), smoother.take_warnings().len()), (2, 0));
 }
+
+/// A line or an arc along `heading`, which starts at `from` or, backwards, ends there. `bend` is the curvature with its sense.
+fn straight_or_bent(
+    number: u64,
+    from: [f64; 2],
+    heading: f64,
+    bend: f64,
+    length: f64,
+    backwards: bool,
+) -> (Move, [f64; 2]) {
+    let way = if backwards { -length } else { length };
+    let turned = bend * way;
+    let other = if bend == 0.0 {
+        [from[0] + way * heading.cos(), from[1] + way * heading.sin()]
+    } else {
+        let (r, (sin, cos)) = (1.0 / bend, heading.sin_cos());
+        let (sin_end, cos_end) = (heading + turned).sin_cos();
+        [from[0] + r * (sin_end - sin), from[1] - r * (cos_end - cos)]
+    };
+    let end = if backwards { from } else { other };
+    let mut moved = line(number, &end);
+    moved.modes.path_mode = PathMode::G64;
+    if bend != 0.0 {
+        let centre_mm = [from[0] - heading.sin() / bend, from[1] + heading.cos() / bend];
+        let geometry =
+            ArcGeometry { plane: [X, Y], centre_mm, radius_mm: (1.0 / bend).abs(), sweep_rad: bend * length };
+        moved.kind = MoveKind::Arc(geometry);
+    }
+    (moved, other)
+}
+
+/// Lines and arcs of both senses, up to more than half a circle, in corners of every angle to both sides.
+fn corners_of_all_kinds() -> Vec<(String, Vec<Move>, f64)> {
+    let mut cases = Vec::new();
+    for first in [0.0, 0.05, -0.05, 0.3, -0.3] {
+        for second in [0.0, 0.08, -0.08, 0.4, -0.4] {
+            for degrees in [3.0, 40.0, 90.0, 135.0, 170.0] {
+                for side in [1.0, -1.0] {
+                    let turn = side * f64::to_radians(degrees);
+                    let length = |bend: f64| if bend.abs() > 0.1 { 4.0 / bend.abs() } else { 15.0 };
+                    let corner = [40.0, -10.0];
+                    let (into, start) = straight_or_bent(2, corner, 0.7, first, length(first), true);
+                    let (out, _) = straight_or_bent(3, corner, 0.7 + turn, second, length(second), false);
+                    let mut lead = line(1, &start);
+                    lead.modes.path_mode = PathMode::G64;
+                    cases.push((format!("{first} {second} {degrees} {side}"), vec![lead, into, out], turn));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Distance of a point from a programmed block.
+fn off(curve: &Curve, q: sollwert::base::AxisVector) -> f64 {
+    let away = |s: f64| (curve.at(s).position.0 - q).norm();
+    let step = curve.length_lu() / 2000.0;
+    let nearest =
+        (0..=2000).map(|i| f64::from(i) * step).min_by(|a, b| away(*a).total_cmp(&away(*b))).expect("samples");
+    let (mut low, mut high) = ((nearest - step).max(0.0), (nearest + step).min(curve.length_lu()));
+    for _ in 0..60 {
+        let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+        if away(a) < away(b) { high = b } else { low = a }
+    }
+    away(low)
+}
+
+#[test]
+fn fillets_of_lines_and_arcs_touch_both_blocks_in_corners_of_every_angle() {
+    for (what, mut moves, turn) in corners_of_all_kinds() {
+        let bare = contour(&moves);
+        let [programmed_in, programmed_out] = [1, 2].map(|i| curves(&bare)[i].clone());
+        for radius in [0.001, 0.05, 0.4] {
+            // Between arcs that bend towards each other a sharp corner has no place for more.
+            if radius > [0.4, 0.05, 0.001][usize::from(turn.abs() > 2.0) + usize::from(turn.abs() > 2.5)] {
+                continue;
+            }
+            moves[1] = with_corner(moves[1].clone(), fillet(radius));
+            let (pieces, mut smoother) = run(&machine(), &moves);
+            let what = format!("{what}, RND={radius}");
+            assert!(smoother.take_warnings().is_empty(), "{what}");
+            let [_, before, Curve::Arc(arc), after] = curves(&pieces)[..] else { panic!("{what}: {pieces:?}") };
+            assert_tangential(&pieces[1..]);
+            close(arc.radius_mm(), radius, 0.0, &what);
+            // Turns to the side of the corner, and less than half a circle.
+            assert!(arc.sweep_rad().signum() == turn.signum() && arc.sweep_rad().abs() < PI, "{what}");
+            // All of its points have their distance from its centre; what is left of the blocks is where it was programmed.
+            let centre = vector(&arc.centre_mm());
+            for q in samples(curves(&pieces)[2]) {
+                close((q - centre).norm(), radius, 1e-9, &what);
+            }
+            for (part, whole) in [(before, &programmed_in), (after, &programmed_out)] {
+                assert!(part.length_lu() < whole.length_lu(), "{what}");
+                for share in [0.0, 0.4, 1.0] {
+                    close(off(whole, part.at(share * part.length_lu()).position.0), 0.0, 1e-9, &what);
+                }
+            }
+            // Nearest to the corner of the circles that touch both: the blocks lose what a corner of lines would, up to their bend.
+            let cut = radius * (turn.abs() / 2.0).tan();
+            for (part, whole) in [(before, &programmed_in), (after, &programmed_out)] {
+                let lost = whole.length_lu() - part.length_lu();
+                let usual = if cut < 0.2 { 0.4 * cut..2.5 * cut } else { 0.0..whole.length_lu() };
+                assert!(usual.contains(&lost), "{what}: {lost} of {cut}");
+            }
+        }
+    }
+}
+
+#[test]
+fn chamfers_of_lines_and_arcs_are_as_long_as_programmed_in_corners_of_every_angle() {
+    for (what, mut moves, _) in corners_of_all_kinds() {
+        let bare = contour(&moves);
+        let wholes = [1, 2].map(|i| curves(&bare)[i].length_lu());
+        for (shape, leg) in
+            [(CornerShape::ChamferLeg { length_mm: 0.3 }, true), (CornerShape::ChamferBase { length_mm: 0.3 }, false)]
+        {
+            moves[1] = with_corner(moves[1].clone(), shape);
+            let (pieces, mut smoother) = run(&machine(), &moves);
+            let warned = smoother.take_warnings();
+            let found = curves(&pieces);
+            assert_eq!(found.len(), 4, "{what}");
+            let lost = [wholes[0] - found[1].length_lu(), wholes[1] - found[3].length_lu()];
+            close(lost[0], lost[1], 1e-9, &what);
+            let Curve::Line(chamfer) = found[2] else { panic!("{what}") };
+            if leg {
+                assert!(warned.is_empty(), "{what}");
+                close(lost[0], 0.3, 1e-9, &what);
+            } else if warned.is_empty() {
+                close(chamfer.length_lu(), 0.3, 1e-9, &what);
+            } else {
+                // The chord never gets that long: all of the shorter block is taken.
+                assert!(chamfer.length_lu() < 0.3, "{what}");
+            }
+            for pair in found[1..].windows(2) {
+                assert_eq!(pair[0].end(), pair[1].start(), "{what}");
+            }
+        }
+    }
+}

@@ -1,8 +1,10 @@
 //! Tests of the room `smoothing`: corners, inserts, path modes, compressor.
 
 mod compressor;
+mod five;
 mod inserts;
 mod modes;
 mod polylines;
 mod quintic;
+mod space;
 mod support;

@@ -1,0 +1,322 @@
+//! Intervals from where the path is to where it can rest, as a problem for the interior-point method, and its solution.
+//!
+//! In: a [`Chain`] of [`Interval`]s with the state at its start. Out: its [`Profile`]: b = v² and its slope at every border, b'' in every interval, from
+//! which speed, acceleration and jerk follow at each place (models/feed-planning.md section 1):
+//!
+//! ```text
+//! v = √b    a = b'/2    j = √b b''/2
+//! |q'' b + q' b'/2| <= A       |q''' b + 3/2 q'' b' + 1/2 q' b''| <= J/√b
+//! ```
+//!
+//! J/√b is convex in b: its tangent at an earlier solution `b̂` lies below it, `J/√b̂ (3/2 - b/(2 b̂))`, so that every solution of the linear
+//! problem obeys the true limit, and the next tangent is a better one. From rest the path starts with constant jerk: `s = j t³/6`, so that b goes
+//! with s^(4/3) (with s under BRISK): at the end of the first interval, h long, `b' = 4/3 b/h`, and the largest b there is that of the largest
+//! jerk. A stop is the same backwards.
+//! Does not know pieces, windows or time laws.
+
+use super::estimate::{Pace, bend_cap, ray_cap, ray_exponent};
+use super::grid::{Derivatives, Interval};
+use super::held::{slowed, tighten};
+use super::interior_point::{Outcome, Problem, Solver};
+use super::rows::{NodeRows, Range, Scale};
+use crate::feed::Limit;
+
+/// State on the path: b = v² and b' = 2 a.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PathPoint {
+    pub speed_squared_lu2_s2: f64,
+    pub slope_lu_s2: f64,
+}
+
+/// How the chain begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Start {
+    /// At rest: the first interval is that of the start.
+    Rest,
+    /// Moving.
+    At(PathPoint),
+}
+
+/// What is planned at once. The last interval is that of the stop.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chain {
+    pub intervals: Vec<Interval>,
+    /// Highest b at the start of each interval, from junctions; infinite where there is none.
+    pub junctions: Vec<Junction>,
+}
+
+/// What a border between pieces allows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Junction {
+    pub speed_squared_lu2_s2: f64,
+    pub limit: Limit,
+}
+
+/// The solution: borders of all intervals, and b'' between them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Profile {
+    /// One more than intervals; at a rest b and b' are 0.
+    pub points: Vec<PathPoint>,
+    /// b'' (1/s²) of every interval; 0 for those of start and stop.
+    pub bends_per_s2: Vec<f64>,
+}
+
+/// Solutions within this share of the time are one.
+const GAP_MAX_RATIO: f64 = 2e-4;
+
+/// Rounds of tangents.
+const ROUNDS_MAX: u32 = 3;
+
+/// Where b is by no more than this away from its estimate the tangent is good enough: it misses 3/8 of the square of it.
+const STRAY_MAX_SHARE: f64 = 0.12;
+
+/// Share of a chain, from its start, in which tangents must fit.
+const NEAR_SHARE: f64 = 0.6;
+
+/// Attempts with tighter limits where those between the places do not hold.
+const ATTEMPTS_MAX: u32 = 8;
+
+/// By how much limits give way, of what planning does not use of them anyway.
+const LOOSER_RATIOS: [f64; 3] = [0.0, 2e-4, 1.5e-3];
+
+/// Share of the estimate to begin with.
+const START_RATIO: f64 = 0.95;
+
+/// Derivatives on the curve of an interval, by its number and s from the start of its piece.
+pub(super) type Look<'a> = dyn Fn(usize, f64) -> Derivatives + 'a;
+
+/// Memory for planning, used again and again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Planning {
+    problem: Problem,
+    solver: Solver,
+    /// b̂ at the borders.
+    estimate: Vec<f64>,
+    caps: Vec<f64>,
+}
+
+impl Chain {
+    pub fn control_range(&self, start: Start) -> std::ops::Range<usize> {
+        usize::from(start == Start::Rest)..self.intervals.len().saturating_sub(1)
+    }
+}
+
+impl Planning {
+    /// The fastest profile of a chain from `start`; `None` if none was found that keeps every limit. `hint`: states at the first borders on a way
+    /// that is known to keep them, if there is one. Limits are tightened in the chain where the first attempts exceed them between two
+    /// places; `look` gives the derivatives on the curve of an interval.
+    pub fn plan(&mut self, chain: &mut Chain, start: Start, hint: &[PathPoint], look: &Look<'_>) -> Option<Profile> {
+        let range = chain.control_range(start);
+        if range.is_empty() || !self.prepare(chain, start, hint) {
+            return None;
+        }
+        let mut attempts = 0;
+        for round in 0.. {
+            if !self.solve(chain, start, &range) {
+                return None;
+            }
+            let profile = self.profile(chain, start);
+            if round + 1 < ROUNDS_MAX && self.strays(&profile, &range) {
+                self.take_estimate(&profile, &range);
+                continue;
+            }
+            if tighten(chain, &profile, &range, look) {
+                return Some(profile);
+            }
+            attempts += 1;
+            if attempts > ATTEMPTS_MAX {
+                return if start == Start::Rest { slowed(chain, profile, &range, look) } else { None };
+            }
+            self.take_estimate(&profile, &range);
+        }
+        None
+    }
+
+    /// Caps and first estimates; false where a number is none.
+    fn prepare(&mut self, chain: &Chain, start: Start, hint: &[PathPoint]) -> bool {
+        let Range { first, last } = Range::of(chain, start);
+        let intervals = &chain.intervals;
+        self.caps.clear();
+        self.caps.extend((first..=last).map(|i| {
+            let before = i.checked_sub(1).map_or(f64::INFINITY, |i| intervals[i].cap.velocity_lu_s);
+            let own = intervals[i].cap.velocity_lu_s.min(before);
+            (own * own).min(chain.junctions[i].speed_squared_lu2_s2)
+        }));
+        let count = last - first;
+        if start == Start::Rest {
+            self.caps[0] = self.caps[0].min(ray_cap(&intervals[0]));
+        }
+        self.caps[count] = self.caps[count].min(ray_cap(&intervals[last]));
+        self.estimate.clear();
+        for i in first..=last {
+            let mut b = self.caps[i - first];
+            let sides = [i.checked_sub(1).map(|i| (&intervals[i], 2)), Some((&intervals[i], 0))];
+            for (interval, place) in sides.into_iter().flatten() {
+                b = b.min(bend_cap(interval, &interval.states[place]));
+            }
+            self.estimate.push(b);
+        }
+        let known = hint.iter().skip(first).map(|point| point.speed_squared_lu2_s2).take_while(|b| *b > 0.0);
+        let mut hinted = 0;
+        for (estimate, known) in self.estimate.iter_mut().zip(known) {
+            *estimate = known;
+            hinted += 1;
+        }
+        if let Start::At(point) = start {
+            self.estimate[0] = point.speed_squared_lu2_s2;
+            hinted = hinted.max(1);
+        }
+        let mut pace = Pace::default();
+        for k in hinted.max(1)..=count {
+            self.estimate[k] = pace.next(&intervals[first + k - 1], self.estimate[k - 1], self.estimate[k]);
+        }
+        let mut pace = Pace::default();
+        for k in (hinted..count).rev() {
+            self.estimate[k] = pace.next(&intervals[first + k], self.estimate[k + 1], self.estimate[k]);
+        }
+        self.estimate.iter().chain(&self.caps).all(|b| *b > 0.0 && !b.is_nan())
+            && self.estimate.iter().all(|b| b.is_finite())
+    }
+
+    fn take_estimate(&mut self, profile: &Profile, range: &std::ops::Range<usize>) {
+        for (estimate, point) in self.estimate.iter_mut().zip(&profile.points[range.start..=range.end]) {
+            *estimate = point.speed_squared_lu2_s2;
+        }
+    }
+
+    /// Anywhere the solution is far from where the tangents were laid.
+    fn strays(&self, profile: &Profile, range: &std::ops::Range<usize>) -> bool {
+        let points = &profile.points[range.start..=range.end];
+        let far = |(estimate, point): (&f64, &PathPoint)| {
+            (point.speed_squared_lu2_s2 / estimate - 1.0).abs() > STRAY_MAX_SHARE
+        };
+        // What lies far ahead is planned again, with this solution for an estimate.
+        let near = (NEAR_SHARE * points.len() as f64).ceil() as usize;
+        self.estimate.iter().zip(points).take(near).any(far)
+    }
+
+    /// The linear problem around the estimate.
+    fn pose(&mut self, chain: &Chain, start: Start) {
+        let Range { first, last } = Range::of(chain, start);
+        let count = last - first;
+        let intervals = &chain.intervals;
+        let Self { problem, estimate, caps, .. } = self;
+        problem.clear();
+        let scale = |k: usize| Scale::new(estimate[k], intervals[first + k.min(count - 1)].length_lu());
+        let stop_lu = intervals[last].length_lu();
+        let mut total = 0.0;
+        for k in 0..=count {
+            let before_lu = if k > 0 {
+                intervals[first + k - 1].length_lu()
+            } else if start == Start::Rest {
+                6.0 * intervals[0].length_lu()
+            } else {
+                0.0
+            };
+            let after_lu = if k < count { intervals[first + k].length_lu() } else { 6.0 * stop_lu };
+            let cost = 0.5 * (before_lu + after_lu) / estimate[k].sqrt();
+            total += cost;
+            problem.costs_ratio.push(cost);
+        }
+        problem.costs_ratio.iter_mut().for_each(|cost| *cost /= total);
+        for k in 0..=count {
+            let mut node = NodeRows {
+                problem,
+                scale: scale(k),
+                fixed: k == 0 && start != Start::Rest,
+                estimate_lu2_s2: estimate[k],
+            };
+            node.state(caps[k], k.checked_sub(1).map(|k| &intervals[first + k]), &intervals[first + k]);
+            if k < count {
+                let interval = &intervals[first + k];
+                node.interval(interval, [estimate[k], estimate[k + 1]]);
+                let transition = scale(k).to(&scale(k + 1), interval.length_lu());
+                if k + 1 == count {
+                    let exponent = ray_exponent(&intervals[last]);
+                    let (feedback, closed) = scale(k + 1).onto_stop(&transition, exponent / stop_lu);
+                    problem.without_control(feedback);
+                    problem.transitions.push(closed);
+                } else {
+                    problem.transitions.push(transition);
+                }
+            }
+            problem.end_node();
+        }
+    }
+
+    /// Solves the problem around the estimate. From a state that uses its limits to the full nothing may be possible but for rounding: the reserve
+    /// gives way a little.
+    fn solve(&mut self, chain: &Chain, start: Start, range: &std::ops::Range<usize>) -> bool {
+        let looser: &[f64] = if start == Start::Rest { &[0.0] } else { &LOOSER_RATIOS };
+        looser.iter().any(|by_ratio| {
+            self.pose(chain, start);
+            self.start_solver(chain, range);
+            self.fix_start(chain, start);
+            self.problem.loosen(*by_ratio);
+            self.solver.solve(&mut self.problem, GAP_MAX_RATIO) == Outcome::Solved
+        })
+    }
+
+    /// A little below the estimate, with the slopes that it has.
+    fn start_solver(&mut self, chain: &Chain, range: &std::ops::Range<usize>) {
+        let (first, count) = (range.start, range.len());
+        let estimate = &self.estimate;
+        let length_lu = |k: usize| chain.intervals[first + k].length_lu();
+        let slope = |k: usize| {
+            let (low, high) = (k.saturating_sub(1), (k + 1).min(count));
+            (estimate[high] - estimate[low]) / (low..high).map(length_lu).sum::<f64>()
+        };
+        // Without bends: what is missing in the transitions does less harm than a wild bend where the grid is fine.
+        let states = (0..=count).map(|k| {
+            let scale = Scale::new(estimate[k], length_lu(k.min(count - 1)));
+            ([START_RATIO, START_RATIO * slope(k) / scale.slope_lu_s2], 0.0)
+        });
+        self.solver.start(states);
+    }
+
+    /// The exact first state, or a point of the ray that it lies on.
+    fn fix_start(&mut self, chain: &Chain, start: Start) {
+        let scale = Scale::new(self.estimate[0], chain.intervals[usize::from(start == Start::Rest)].length_lu());
+        let state = match start {
+            Start::At(point) => scale.scaled(&point),
+            Start::Rest => {
+                let ray = [
+                    1.0,
+                    ray_exponent(&chain.intervals[0]) / chain.intervals[0].length_lu() * scale.b_lu2_s2
+                        / scale.slope_lu_s2,
+                ];
+                self.problem.start_ray_ratio = Some(ray);
+                ray.map(|component| 0.9 * component)
+            }
+        };
+        self.solver.set_first(state);
+    }
+
+    fn profile(&self, chain: &Chain, start: Start) -> Profile {
+        let Range { first, last } = Range::of(chain, start);
+        let count = last - first;
+        let rest = PathPoint { speed_squared_lu2_s2: 0.0, slope_lu_s2: 0.0 };
+        let mut profile = Profile::default();
+        if start == Start::Rest {
+            profile.points.push(rest);
+            profile.bends_per_s2.push(0.0);
+        }
+        for k in 0..=count {
+            let length_lu = chain.intervals[first + k.min(count - 1)].length_lu();
+            let scale = Scale::new(self.estimate[k], length_lu);
+            let [b, slope] = self.solver.state_ratio(k);
+            profile
+                .points
+                .push(PathPoint { speed_squared_lu2_s2: b * scale.b_lu2_s2, slope_lu_s2: slope * scale.slope_lu_s2 });
+        }
+        for k in 0..count {
+            let (before, after) = (profile.points[first + k], profile.points[first + k + 1]);
+            profile
+                .bends_per_s2
+                .push((after.slope_lu_s2 - before.slope_lu_s2) / chain.intervals[first + k].length_lu());
+        }
+        profile.points.push(rest);
+        profile.bends_per_s2.push(0.0);
+        profile
+    }
+}

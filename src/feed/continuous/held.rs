@@ -1,0 +1,200 @@
+//! Whether a profile keeps its limits between the places at which it was planned, and what holds it where.
+//!
+//! In: a chain and its profile. Out: the greatest use of any limit in each interval, sampled at eighths with a parabola through each three neighbours;
+//! tighter reserves where that is too much ([`tighten`]); the [`Limit`] that holds an interval.
+//! Does not plan.
+
+use super::chain::{Chain, Look, PathPoint, Profile};
+use super::grid::{Derivatives, Interval};
+use crate::feed::{Limit, LimitKind};
+
+/// How far below the share that would just do.
+const TIGHTER_RATIO: f64 = 0.995;
+
+/// A limit that is used so far at the eighths of an interval holds between them.
+const HELD_RATIO: f64 = 0.9995;
+
+/// A profile that uses a limit this many times is not slowed down but given up.
+const SLOWED_MAX_RATIO: f64 = 4.0;
+
+/// Above this use of a limit the curve itself is looked at.
+const NEAR_RATIO: f64 = 0.9;
+
+impl Profile {
+    /// State inside an interval, `share` of its length from its start.
+    fn inside(&self, chain: &Chain, index: usize, share: f64) -> (PathPoint, f64) {
+        let (point, bend) = (self.points[index], self.bends_per_s2[index]);
+        let x = share * chain.intervals[index].length_lu();
+        let b = point.speed_squared_lu2_s2 + x * (point.slope_lu_s2 + 0.5 * x * bend);
+        (PathPoint { speed_squared_lu2_s2: b, slope_lu_s2: point.slope_lu_s2 + x * bend }, bend)
+    }
+
+    /// What holds the speed in an interval, and how far its limit is used at the middle; of the ends what is used most there.
+    pub fn limit(&self, chain: &Chain, index: usize) -> Limit {
+        let interval = &chain.intervals[index];
+        let mut most = (0.0, interval.cap.limit);
+        let mut offer = |used: f64, limit: Limit| {
+            if used > most.0 {
+                most = (used, limit);
+            }
+        };
+        for (place, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
+            let (point, bend) = self.inside(chain, index, share);
+            let b = point.speed_squared_lu2_s2.max(0.0);
+            if place == 1 {
+                offer(b / interval.cap.velocity_lu_s.powi(2), interval.cap.limit);
+                let used = Used::at(interval, &interval.states[place], &point, bend);
+                offer(used.acceleration.0 / interval.reserve_ratio, used.acceleration.1);
+                offer(used.jerk.0 / interval.reserve_ratio, used.jerk.1);
+            } else if let Some(junction) = chain.junctions.get(index + place / 2) {
+                offer(0.999 * b / junction.speed_squared_lu2_s2, junction.limit);
+            }
+        }
+        most.1
+    }
+}
+
+/// How far the limits are used at a place.
+struct Used {
+    acceleration: (f64, Limit),
+    jerk: (f64, Limit),
+}
+
+impl Used {
+    fn at(interval: &Interval, state: &Derivatives, point: &PathPoint, bend_per_s2: f64) -> Self {
+        let (b, slope) = (point.speed_squared_lu2_s2, point.slope_lu_s2);
+        let none = (0.0, interval.cap.limit);
+        let mut used = Self { acceleration: none, jerk: none };
+        for bound in &interval.bounds.axes {
+            let axis = bound.axis;
+            let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
+            let acceleration = (second * b + 0.5 * first * slope).abs() / bound.acceleration_lu_s2;
+            if acceleration > used.acceleration.0 || acceleration.is_nan() {
+                used.acceleration = (acceleration, Limit { kind: LimitKind::Acceleration, axis: Some(axis) });
+            }
+            let Some(limit) = bound.jerk_lu_s3 else { continue };
+            let jerk = (third * b + 1.5 * second * slope + 0.5 * first * bend_per_s2).abs() * b.max(0.0).sqrt() / limit;
+            if jerk > used.jerk.0 || jerk.is_nan() {
+                used.jerk = (jerk, Limit { kind: interval.bounds.jerk_kind, axis: Some(axis) });
+            }
+        }
+        used
+    }
+}
+
+/// How much of its limits an interval uses at most, on the curve itself where it comes near them; NaN where b is not positive.
+fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
+    let interval = &chain.intervals[index];
+    if interval.is_straight() {
+        return used_straight(interval, profile, chain, index);
+    }
+    let rough = most_used(interval, profile, chain, index, &interval.eighths(None));
+    if rough < NEAR_RATIO || rough.is_nan() {
+        return rough;
+    }
+    let places = [0.25, 0.75].map(|share| interval.start_lu + share * interval.length_lu());
+    most_used(interval, profile, chain, index, &interval.eighths(Some(places.map(|s_lu| look(index, s_lu)))))
+}
+
+/// The same on a straight stretch: the acceleration is greatest at an end, the jerk where b is.
+fn used_straight(interval: &Interval, profile: &Profile, chain: &Chain, index: usize) -> f64 {
+    let bend = profile.bends_per_s2[index];
+    let points = [0.0, 0.5, 1.0].map(|share| profile.inside(chain, index, share).0);
+    if points.iter().any(|point| !positive(point)) {
+        return f64::NAN;
+    }
+    let ends = [points[0], points[2]];
+    let mut b = ends.iter().fold(0.0_f64, |most, point| most.max(point.speed_squared_lu2_s2));
+    let slope = points[0].slope_lu_s2;
+    if bend < 0.0 && slope > 0.0 && points[2].slope_lu_s2 < 0.0 {
+        // The vertex of the parabola lies inside.
+        b = points[0].speed_squared_lu2_s2 - 0.5 * slope * slope / bend;
+    }
+    let slope = ends.iter().fold(0.0_f64, |most, point| most.max(point.slope_lu_s2.abs()));
+    let mut most = 0.0_f64;
+    for bound in &interval.bounds.axes {
+        let first = interval.states[0].first[bound.axis].abs();
+        most = most.max(0.5 * first * slope / bound.acceleration_lu_s2);
+        most = most.max(0.5 * first * bend.abs() * b.sqrt() / bound.jerk_lu_s3.unwrap_or(f64::INFINITY));
+    }
+    most
+}
+
+fn most_used(interval: &Interval, profile: &Profile, chain: &Chain, index: usize, states: &[Derivatives; 9]) -> f64 {
+    let places: [(PathPoint, f64); 9] = std::array::from_fn(|i| profile.inside(chain, index, 0.125 * i as f64));
+    if places.iter().any(|(point, _)| !positive(point)) {
+        return f64::NAN;
+    }
+    let mut most = 0.0_f64;
+    for bound in &interval.bounds.axes {
+        let axis = bound.axis;
+        let (mut accelerations, mut jerks) = ([0.0; 9], [0.0; 9]);
+        for (i, ((point, bend), state)) in places.iter().zip(states).enumerate() {
+            let (b, slope) = (point.speed_squared_lu2_s2, point.slope_lu_s2);
+            let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
+            accelerations[i] = second * b + 0.5 * first * slope;
+            jerks[i] = (third * b + 1.5 * second * slope + 0.5 * first * bend) * b.sqrt();
+        }
+        most = most.max(summit(&accelerations) / bound.acceleration_lu_s2);
+        if let Some(jerk) = bound.jerk_lu_s3 {
+            most = most.max(summit(&jerks) / jerk);
+        }
+    }
+    most
+}
+
+/// Greatest amount of a function that is known at equal distances: between them by parabolas.
+fn summit(values: &[f64; 9]) -> f64 {
+    let mut most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    for triple in values.windows(3) {
+        let [left, middle, right] = [triple[0], triple[1], triple[2]];
+        let (slope, bend) = (0.5 * (right - left), left - 2.0 * middle + right);
+        // The vertex lies between the outer two, on the same side of 0.
+        if slope.abs() < bend.abs() && bend * middle < 0.0 {
+            most = most.max((middle - 0.5 * slope * slope / bend).abs());
+        }
+    }
+    most
+}
+
+/// The same profile from rest to rest, slower by what its limits are used too far: with time stretched by λ accelerations fall with λ², jerks with λ³.
+pub(super) fn slowed(
+    chain: &Chain,
+    mut profile: Profile,
+    range: &std::ops::Range<usize>,
+    look: &Look<'_>,
+) -> Option<Profile> {
+    let most = range
+        .clone()
+        .map(|index| used_inside(chain, &profile, index, look))
+        .fold(0.0_f64, |most, used| if used.is_nan() { used } else { most.max(used) });
+    if most.is_nan() || most > SLOWED_MAX_RATIO {
+        return None;
+    }
+    let ratio = HELD_RATIO / most.max(HELD_RATIO);
+    for point in &mut profile.points {
+        point.speed_squared_lu2_s2 *= ratio;
+        point.slope_lu_s2 *= ratio;
+    }
+    profile.bends_per_s2.iter_mut().for_each(|bend| *bend *= ratio);
+    Some(profile)
+}
+
+/// True if every limit holds inside every interval too; else the limits of those where it does not are tightened.
+pub(super) fn tighten(chain: &mut Chain, profile: &Profile, range: &std::ops::Range<usize>, look: &Look<'_>) -> bool {
+    let mut holds = true;
+    for index in range.clone() {
+        let most = used_inside(chain, profile, index, look);
+        if most <= HELD_RATIO {
+            continue;
+        }
+        holds = false;
+        let ratio = if most.is_nan() { 0.5 } else { (TIGHTER_RATIO / most).max(0.5) };
+        chain.intervals[index].reserve_ratio *= ratio;
+    }
+    holds
+}
+
+fn positive(point: &PathPoint) -> bool {
+    point.speed_squared_lu2_s2 > 0.0
+}

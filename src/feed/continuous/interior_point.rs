@@ -1,0 +1,460 @@
+//! The fastest profile of a chain of intervals under linear limits: a primal-dual interior-point method that knows the chain.
+//!
+//! In: a [`Problem`]: for every interval how the state `x = (b, b')` at its start and the control `u = b''` give the state at its
+//! end, the limits `a . (x, u) <= d` that hold there, and the cost. Out: states and controls in [`Solver`]. All numbers are scaled by the caller to
+//! the order of 1.
+//!
+//! Minimised is `sum c_i / sqrt(b_i)`, the time: convex where b > 0. Each step of Mehrotra's predictor-corrector method is a linear-quadratic
+//! problem along the chain, solved by a Riccati recursion over 2 x 2 matrices, so that its cost goes with the number of intervals
+//! [Mehrotra 1992]. The states need not obey the chain to begin with.
+//!
+//! The last interval has no control of its own (`b = 0` in its transition): the state at the end lies on a ray. The first state is
+//! given, or any point of a ray.
+//! Does not know what b, limits and intervals mean.
+
+/// One limit: `a . (x0, x1, u) <= bound`, with its slack and multiplier.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    a: [f64; 3],
+    bound: f64,
+    holds: bool,
+    slack: f64,
+    multiplier: f64,
+    /// 1/slack and multiplier/slack at the present point.
+    inverse: f64,
+    weight: f64,
+    residual: f64,
+    slack_step: f64,
+    multiplier_step: f64,
+    correction: f64,
+}
+
+/// From the state at the start of an interval to that at its end: `x+ = A x + B u`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Transition {
+    /// A by rows.
+    pub state_ratio: [f64; 4],
+    /// B; zeros: the interval has no control.
+    pub control_ratio: [f64; 2],
+}
+
+/// What is to be solved.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Problem {
+    rows: Vec<Row>,
+    /// Rows of node i are `ends[i - 1] .. ends[i]`.
+    ends: Vec<usize>,
+    /// c of every node.
+    pub costs_ratio: Vec<f64>,
+    /// Of every interval.
+    pub transitions: Vec<Transition>,
+    /// The first state is a point of this ray; `None`: it is given.
+    pub start_ray_ratio: Option<[f64; 2]>,
+}
+
+impl Problem {
+    /// Forgets everything but its memory.
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.ends.clear();
+        self.costs_ratio.clear();
+        self.transitions.clear();
+        self.start_ray_ratio = None;
+    }
+
+    /// A limit of the node at hand and the interval after it.
+    pub fn limit(&mut self, a_ratio: [f64; 3], bound_ratio: f64) {
+        self.rows.push(Row {
+            a: a_ratio,
+            bound: bound_ratio,
+            holds: false,
+            slack: 0.0,
+            multiplier: 0.0,
+            inverse: 0.0,
+            weight: 0.0,
+            residual: 0.0,
+            slack_step: 0.0,
+            multiplier_step: 0.0,
+            correction: 0.0,
+        });
+    }
+
+    /// Limits of the node at hand so far, to be rewritten in place where the interval after it has no control.
+    pub fn without_control(&mut self, feedback_ratio: [f64; 2]) {
+        let start = self.ends.last().copied().unwrap_or(0);
+        for row in &mut self.rows[start..] {
+            row.a = [row.a[0] + row.a[2] * feedback_ratio[0], row.a[1] + row.a[2] * feedback_ratio[1], 0.0];
+        }
+    }
+
+    /// The last limit never gives way.
+    pub fn hold_last(&mut self) {
+        if let Some(row) = self.rows.last_mut() {
+            row.holds = true;
+        }
+    }
+
+    /// Every limit that may give way counts as so much wider.
+    pub fn loosen(&mut self, by_ratio: f64) {
+        for row in self.rows.iter_mut().filter(|row| !row.holds) {
+            row.bound += by_ratio * row.bound.abs().min(1.0);
+        }
+    }
+
+    /// The limits of the node at hand are complete.
+    pub fn end_node(&mut self) {
+        self.ends.push(self.rows.len());
+    }
+}
+
+/// Work of one node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    state: [f64; 2],
+    control: f64,
+    state_step: [f64; 2],
+    control_step: f64,
+    /// Missing in the transition to the next node.
+    gap: [f64; 2],
+    /// Hessian: 00, 01, 11, 0u, 1u, uu.
+    hessian: [f64; 6],
+    /// Gradient of cost and limits: without centring; what centring and the correction of second order add.
+    force: [f64; 3],
+    inward: [f64; 3],
+    correction: [f64; 3],
+    /// Value function of the recursion: 00, 01, 11.
+    value: [f64; 3],
+    /// Of the control: its own curvature, and its coupling with the state.
+    control_curvature: f64,
+    control_coupling: [f64; 2],
+    feedback: [f64; 2],
+    feedforward: f64,
+}
+
+/// How an attempt ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// Within the tolerance of the optimum, limits kept.
+    Solved,
+    /// No such point was found.
+    Failed,
+}
+
+/// Memory of the method, used again and again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Solver {
+    nodes: Vec<Node>,
+}
+
+/// Steps after which a problem counts as unsolvable.
+const STEPS_MAX: u32 = 80;
+
+/// How much of the way to the nearest limit a step goes.
+const STEP_SHARE: f64 = 0.99;
+
+/// Slack that a row starts with at least.
+const SLACK_START_MIN: f64 = 0.05;
+
+/// Limits and transitions are met to this.
+const RESIDUAL_MAX: f64 = 1e-10;
+
+/// Steps shorter than this, so many in a row, lead nowhere.
+const STALL_STEP: f64 = 0.2;
+const STALLS_MAX: u32 = 2;
+
+/// What is good enough there.
+const STALLED_GAP_MAX_RATIO: f64 = 0.02;
+const STALLED_RESIDUAL_MAX: f64 = 1e-9;
+
+/// Added to the curvature where nothing else is.
+const CURVATURE_MIN: f64 = 1e-12;
+
+impl Solver {
+    /// State of a node.
+    pub fn state_ratio(&self, node: usize) -> [f64; 2] {
+        self.nodes[node].state
+    }
+
+    /// Starts from these states and the controls after them.
+    pub fn start(&mut self, states_ratio: impl IntoIterator<Item = ([f64; 2], f64)>) {
+        self.nodes.clear();
+        self.nodes.extend(states_ratio.into_iter().map(|(state, control)| Node { state, control, ..Node::default() }));
+    }
+
+    /// The first state, which stays as it is or on its ray.
+    pub fn set_first(&mut self, state_ratio: [f64; 2]) {
+        if let Some(first) = self.nodes.first_mut() {
+            first.state = state_ratio;
+        }
+    }
+
+    /// Solves to a cost within `gap_max_ratio` of the least, absolute.
+    pub fn solve(&mut self, problem: &mut Problem, gap_max_ratio: f64) -> Outcome {
+        if self.nodes.len() != problem.transitions.len() + 1 || problem.rows.is_empty() {
+            return Outcome::Failed;
+        }
+        let count = problem.rows.len() as f64;
+        self.first_slacks(problem, count);
+        let (mut stalls, mut step) = (0, 0.0);
+        for _ in 0..STEPS_MAX {
+            let (gap, residual) = self.advance(problem, step);
+            if !gap.is_finite() {
+                return Outcome::Failed;
+            }
+            if gap <= gap_max_ratio && residual <= RESIDUAL_MAX {
+                return Outcome::Solved;
+            }
+            self.factorise(problem);
+            self.backward(problem, 0.0, 0.0);
+            let predicted = self.predict(problem);
+            let centring = (predicted.gap_after(gap) / gap).powi(3).min(1.0) * gap / count;
+            self.backward(problem, centring, 1.0);
+            let (primal, dual) = self.correct(problem, centring);
+            let share = STEP_SHARE.max(1.0 - gap);
+            step = (share * primal.min(dual)).min(1.0);
+            // Where hardly anything is free the multipliers grow without bound, and the steps vanish: a point that keeps the limits will do.
+            let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= STALLED_RESIDUAL_MAX;
+            stalls = if usable && step < STALL_STEP { stalls + 1 } else { 0 };
+            if stalls >= STALLS_MAX {
+                return Outcome::Solved;
+            }
+        }
+        Outcome::Failed
+    }
+
+    fn first_slacks(&self, problem: &mut Problem, count: f64) {
+        let product = 3.0 * problem.costs_ratio.iter().sum::<f64>() / count;
+        let Problem { rows, ends, .. } = problem;
+        let mut first = 0;
+        for (node, end) in self.nodes.iter().zip(ends.iter()) {
+            for row in &mut rows[first..*end] {
+                let left = row.bound - row.along(&node.state, node.control);
+                row.slack = left.max(SLACK_START_MIN);
+                row.multiplier = product / row.slack;
+                row.correction = 0.0;
+            }
+            first = *end;
+        }
+    }
+
+    /// Goes a step along the direction; then residuals, weights, Hessians and forces of the limits there: the complementarity gap, and the
+    /// greatest residual.
+    fn advance(&mut self, problem: &mut Problem, step: f64) -> (f64, f64) {
+        for node in &mut self.nodes {
+            node.state[0] += step * node.state_step[0];
+            node.state[1] += step * node.state_step[1];
+            node.control += step * node.control_step;
+        }
+        let (mut total, mut residual) = (0.0, 0.0_f64);
+        for i in 0..problem.transitions.len() {
+            let (x, u, next) = (self.nodes[i].state, self.nodes[i].control, self.nodes[i + 1].state);
+            let reached = problem.transitions[i].apply(&x, u);
+            let gap = [reached[0] - next[0], reached[1] - next[1]];
+            residual = residual.max(gap[0].abs()).max(gap[1].abs());
+            self.nodes[i].gap = gap;
+        }
+        let Problem { rows, ends, costs_ratio, .. } = problem;
+        let mut first = 0;
+        for ((node, end), cost) in self.nodes.iter_mut().zip(ends.iter()).zip(costs_ratio.iter()) {
+            let b = node.state[0].max(f64::MIN_POSITIVE);
+            let root = b.sqrt();
+            let mut force = [-0.5 * cost / (b * root), 0.0, 0.0];
+            let mut h = [0.75 * cost / (b * b * root), 0.0, CURVATURE_MIN, 0.0, 0.0, CURVATURE_MIN];
+            for row in &mut rows[first..*end] {
+                row.slack += step * row.slack_step;
+                row.multiplier += step * row.multiplier_step;
+                row.residual = row.bound - row.along(&node.state, node.control) - row.slack;
+                residual = residual.max(row.residual.abs());
+                total += row.slack * row.multiplier;
+                row.inverse = 1.0 / row.slack;
+                row.weight = row.multiplier * row.inverse;
+                let pull = -row.weight * row.residual;
+                let [a0, a1, a2] = row.a;
+                force = [force[0] + pull * a0, force[1] + pull * a1, force[2] + pull * a2];
+                let (w0, w1) = (row.weight * a0, row.weight * a1);
+                h[0] += w0 * a0;
+                h[1] += w0 * a1;
+                h[2] += w1 * a1;
+                h[3] += w0 * a2;
+                h[4] += w1 * a2;
+                h[5] += row.weight * a2 * a2;
+            }
+            (node.hessian, node.force) = (h, force);
+            first = *end;
+        }
+        (total, residual)
+    }
+
+    /// Riccati recursion from the end.
+    fn factorise(&mut self, problem: &Problem) {
+        let count = problem.transitions.len();
+        let h = self.nodes[count].hessian;
+        let mut p = [h[0], h[1], h[2]];
+        self.nodes[count].value = p;
+        for (node, transition) in self.nodes[..count].iter_mut().zip(&problem.transitions).rev() {
+            let [a00, a01, a10, a11] = transition.state_ratio;
+            let [b0, b1] = transition.control_ratio;
+            let h = node.hessian;
+            let pa =
+                [p[0] * a00 + p[1] * a10, p[0] * a01 + p[1] * a11, p[1] * a00 + p[2] * a10, p[1] * a01 + p[2] * a11];
+            let q =
+                [h[0] + a00 * pa[0] + a10 * pa[2], h[1] + a00 * pa[1] + a10 * pa[3], h[2] + a01 * pa[1] + a11 * pa[3]];
+            if transition.has_control() {
+                let pb = [p[0] * b0 + p[1] * b1, p[1] * b0 + p[2] * b1];
+                let curvature = h[5] + b0 * pb[0] + b1 * pb[1];
+                let coupling = [h[3] + b0 * pa[0] + b1 * pa[2], h[4] + b0 * pa[1] + b1 * pa[3]];
+                let k = [-coupling[0] / curvature, -coupling[1] / curvature];
+                (node.control_curvature, node.control_coupling, node.feedback) = (curvature, coupling, k);
+                p = [q[0] + coupling[0] * k[0], q[1] + coupling[0] * k[1], q[2] + coupling[1] * k[1]];
+            } else {
+                (node.control_curvature, node.control_coupling, node.feedback) = (1.0, [0.0; 2], [0.0; 2]);
+                p = q;
+            }
+            node.value = p;
+        }
+    }
+
+    /// Newton's direction from the end to the start, for a complementarity product of `centring`, with a share of the correction of second
+    /// order; and the first step of the states.
+    fn backward(&mut self, problem: &Problem, centring: f64, corrected: f64) {
+        let count = problem.transitions.len();
+        let mut p = [0.0; 2];
+        for i in (0..=count).rev() {
+            let next = if i < count { self.nodes[i + 1].value } else { [0.0; 3] };
+            let node = &mut self.nodes[i];
+            let g: [f64; 3] = std::array::from_fn(|k| {
+                let second_order =
+                    if corrected > 0.0 { centring * node.inward[k] - corrected * node.correction[k] } else { 0.0 };
+                node.force[k] + second_order
+            });
+            if i == count {
+                p = [g[0], g[1]];
+                continue;
+            }
+            let transition = &problem.transitions[i];
+            let [a00, a01, a10, a11] = transition.state_ratio;
+            let [b0, b1] = transition.control_ratio;
+            let e = node.gap;
+            let v = [p[0] + next[0] * e[0] + next[1] * e[1], p[1] + next[1] * e[0] + next[2] * e[1]];
+            p = [g[0] + a00 * v[0] + a10 * v[1], g[1] + a01 * v[0] + a11 * v[1]];
+            node.feedforward = 0.0;
+            if transition.has_control() {
+                node.feedforward = -(g[2] + b0 * v[0] + b1 * v[1]) / node.control_curvature;
+                p[0] += node.control_coupling[0] * node.feedforward;
+                p[1] += node.control_coupling[1] * node.feedforward;
+            }
+        }
+        self.nodes[0].state_step =
+            problem.start_ray_ratio.map_or([0.0; 2], |ray| along_ray(ray, &self.nodes[0].value, &p));
+    }
+
+    /// Steps of the control of node `i` and of the state after it.
+    fn step_on(&mut self, problem: &Problem, i: usize) {
+        let Some(transition) = problem.transitions.get(i) else {
+            self.nodes[i].control_step = 0.0;
+            return;
+        };
+        let node = &mut self.nodes[i];
+        let dx = node.state_step;
+        node.control_step = node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward;
+        let reached = transition.apply(&dx, node.control_step);
+        let gap = node.gap;
+        self.nodes[i + 1].state_step = [reached[0] + gap[0], reached[1] + gap[1]];
+    }
+
+    /// The affine direction: how far it leads, and what it changes to second order.
+    fn predict(&mut self, problem: &mut Problem) -> Prediction {
+        let mut prediction = Prediction::default();
+        let mut first = 0;
+        for i in 0..=problem.transitions.len() {
+            self.step_on(problem, i);
+            let node = &mut self.nodes[i];
+            let (mut inward, mut correction) = ([0.0; 3], [0.0; 3]);
+            for row in &mut problem.rows[first..problem.ends[i]] {
+                let slack_step = row.residual - row.along(&node.state_step, node.control_step);
+                let multiplier_step = -row.multiplier - row.weight * slack_step;
+                prediction.take(row, slack_step, multiplier_step);
+                row.correction = slack_step * multiplier_step;
+                let second = row.correction * row.inverse;
+                for ((inward, correction), a) in inward.iter_mut().zip(&mut correction).zip(row.a) {
+                    *inward += row.inverse * a;
+                    *correction += second * a;
+                }
+            }
+            (node.inward, node.correction) = (inward, correction);
+            first = problem.ends[i];
+        }
+        prediction
+    }
+
+    /// The corrected direction: the steps at which the first slack and the first multiplier would vanish.
+    fn correct(&mut self, problem: &mut Problem, centring: f64) -> (f64, f64) {
+        let (mut primal, mut dual) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
+        let mut first = 0;
+        for i in 0..=problem.transitions.len() {
+            self.step_on(problem, i);
+            let node = &self.nodes[i];
+            for row in &mut problem.rows[first..problem.ends[i]] {
+                row.slack_step = row.residual - row.along(&node.state_step, node.control_step);
+                row.multiplier_step =
+                    (centring - row.correction) * row.inverse - row.multiplier - row.weight * row.slack_step;
+                primal = primal.max(-row.slack_step * row.inverse);
+                dual = dual.max(-row.multiplier_step / row.multiplier);
+            }
+            first = problem.ends[i];
+        }
+        (1.0 / primal, 1.0 / dual)
+    }
+}
+
+/// How far the affine direction leads, and the products of slacks and multipliers on the way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Prediction {
+    /// Reciprocals of the steps at which the first slack and the first multiplier would vanish.
+    primal: f64,
+    dual: f64,
+    /// Sums of multiplier times slack step, slack times multiplier step, and of both steps.
+    by_slack: f64,
+    by_multiplier: f64,
+    by_both: f64,
+}
+
+impl Prediction {
+    fn take(&mut self, row: &Row, slack_step: f64, multiplier_step: f64) {
+        self.primal = self.primal.max(-slack_step * row.inverse);
+        self.dual = self.dual.max(-multiplier_step / row.multiplier);
+        self.by_slack += row.multiplier * slack_step;
+        self.by_multiplier += row.slack * multiplier_step;
+        self.by_both += slack_step * multiplier_step;
+    }
+
+    /// The gap at the end of the longest step.
+    fn gap_after(&self, gap: f64) -> f64 {
+        let (primal, dual) = (1.0 / self.primal.max(1.0), 1.0 / self.dual.max(1.0));
+        gap + primal * self.by_slack + dual * self.by_multiplier + primal * dual * self.by_both
+    }
+}
+
+impl Row {
+    fn along(&self, state: &[f64; 2], control: f64) -> f64 {
+        self.a[0] * state[0] + self.a[1] * state[1] + self.a[2] * control
+    }
+}
+
+impl Transition {
+    fn apply(&self, state: &[f64; 2], control: f64) -> [f64; 2] {
+        let ([a00, a01, a10, a11], [b0, b1]) = (self.state_ratio, self.control_ratio);
+        [a00 * state[0] + a01 * state[1] + b0 * control, a10 * state[0] + a11 * state[1] + b1 * control]
+    }
+
+    fn has_control(&self) -> bool {
+        self.control_ratio != [0.0; 2]
+    }
+}
+
+/// The step along the ray that is best for the value function.
+fn along_ray(ray: [f64; 2], value: &[f64; 3], gradient: &[f64; 2]) -> [f64; 2] {
+    let curvature = value[0] * ray[0] * ray[0] + 2.0 * value[1] * ray[0] * ray[1] + value[2] * ray[1] * ray[1];
+    let step = -(ray[0] * gradient[0] + ray[1] * gradient[1]) / curvature;
+    [ray[0] * step, ray[1] * step]
+}

@@ -1,0 +1,72 @@
+//! The same path in another way takes the same time: reversed, and with a block in two.
+
+use crate::program::{Block, Program};
+use crate::random::Random;
+use crate::run::Run;
+use crate::settings::{Law, Settings};
+use crate::verdict::{Finding, Kind};
+use std::sync::Arc;
+
+/// A window that is longer than every stopping distance here.
+const WINDOW_BLOCKS: u32 = 2000;
+
+/// What times may differ by, of the time, and in cycles: two runs end between two cycles each, and so does the approach.
+const REVERSED_RATIO: f64 = 0.005;
+const REVERSED_CYCLES: f64 = 3.0;
+
+/// The reversed path takes as long. `None`: it does, or there is no such path. Under `seven-phase` a ramp ends where a block ends, and a
+/// backward pass is not the mirror of a forward one: nothing is promised.
+pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
+    if settings.law == Law::SevenPhase {
+        return None;
+    }
+    let back = program.reversed()?;
+    let settings = Settings { look_ahead_blocks: WINDOW_BLOCKS, ..settings.clone() };
+    let machine = Arc::new(settings.machine());
+    let (there, end) = program.text_from(&settings, [0.0; 5], "");
+    let words: String =
+        settings.axes.iter().enumerate().map(|(i, axis)| format!(" {}{:.6}", axis.name, end[i])).collect();
+    let opening = format!("G60\nG0{words}\n");
+    let approach = format!("G17 G90 G71 G94 G1\n{opening}M30\n");
+    let (back, _) = back.text_from(&settings, end, &opening);
+    let time = |text: &str| Run::new(&machine, text).ok().map(|run| (run.cycle_time_s(), run));
+    let ((there_s, first), (back_s, second), (approach_s, third)) = (time(&there)?, time(&back)?, time(&approach)?);
+    // Rounding of points may make a corner, or take one away.
+    let same_path = first.blends() == second.blends()
+        && (first.path_length_lu() + third.path_length_lu() - second.path_length_lu()).abs() < 1e-4;
+    if !same_path {
+        return None;
+    }
+    let back_s = back_s - approach_s;
+    let allowed = REVERSED_RATIO * there_s + REVERSED_CYCLES * first.t_s;
+    let ratio = (there_s - back_s).abs() / allowed;
+    let text = format!("{there_s:.6} s, reversed {back_s:.6} s ({:+.3} %)", 100.0 * (back_s / there_s - 1.0));
+    (ratio > 1.0).then_some(Finding { kind: Kind::Reversed, ratio, text })
+}
+
+/// A line in two is the same motion. `None`: it is, or there is no line to split, or the split changes the path.
+pub fn split(settings: &Settings, program: &Program, random: &mut Random) -> Option<Finding> {
+    if settings.law != Law::Continuous {
+        return None;
+    }
+    let lines: Vec<usize> =
+        (0..program.blocks.len()).filter(|index| matches!(program.blocks[*index], Block::Motion { .. })).collect();
+    let index = *lines.get(random.below(lines.len().max(1) as u32) as usize)?;
+    let parted = program.split(index, random.between(0.25, 0.75))?;
+    let settings = Settings { look_ahead_blocks: WINDOW_BLOCKS, ..settings.clone() };
+    let machine = Arc::new(settings.machine());
+    let runs = [program, &parted].map(|program| Run::new(&machine, &program.text(&settings)).ok());
+    let [Some(whole), Some(parts)] = runs else { return None };
+    let same_path = whole.blends() == parts.blends() && (whole.path_length_lu() - parts.path_length_lu()).abs() < 1e-7;
+    if !same_path {
+        return None;
+    }
+    let [whole_s, parts_s] = [&whole, &parts].map(Run::cycle_time_s);
+    let allowed = SPLIT_RATIO * whole_s + 1.5 * whole.t_s;
+    let ratio = (whole_s - parts_s).abs() / allowed;
+    let text = format!("{whole_s:.6} s, with block {index} in two {parts_s:.6} s");
+    (ratio > 1.0).then_some(Finding { kind: Kind::Split, ratio, text })
+}
+
+/// What a split may change, of the time: the planner's own tolerance.
+const SPLIT_RATIO: f64 = 2e-4;
