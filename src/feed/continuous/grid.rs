@@ -60,7 +60,7 @@ const LINE_RESERVE_RATIO: f64 = 0.998;
 const CURVE_RESERVE_RATIO: f64 = 0.992;
 
 /// Reserve of axis velocities, of the change of |q'| over an interval.
-const VELOCITY_RESERVE_RATIO: f64 = 0.02;
+const VELOCITY_RESERVE_RATIO: f64 = 0.05;
 
 /// An axis below this share of the greatest demands of all never comes near its limits.
 const IDLE_SHARE: f64 = 1e-3;

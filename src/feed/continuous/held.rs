@@ -21,7 +21,7 @@ const JUNCTION_SHARE: f64 = 0.999;
 const SLOWED_MAX_RATIO: f64 = 4.0;
 
 /// Above this use of a limit the curve itself is looked at.
-const NEAR_RATIO: f64 = 0.9;
+const NEAR_RATIO: f64 = 0.7;
 
 impl Profile {
     /// State inside an interval, `share` of its length from its start.
