@@ -166,6 +166,19 @@ impl AxisRules {
         }
     }
 
+    /// The rules that hold from end to end of a piece, whatever its speed: under DRIVE the full acceleration where F keeps every axis
+    /// below the velocity from which it is lower, the lower one elsewhere.
+    pub(super) fn throughout(&self, feed: &FeedCap) -> &Self {
+        match (&self.drive, feed) {
+            (None, _) => self,
+            (Some(drive), FeedCap::Rapid) => &drive.weak,
+            (Some(drive), FeedCap::Programmed(cap)) => {
+                let slowest_lu_s = drive.slow.feed_velocities_max_lu_s.iter().copied().fold(f64::INFINITY, f64::min);
+                if cap.velocity_lu_s <= slowest_lu_s { self } else { &drive.weak }
+            }
+        }
+    }
+
     /// `None` where no axis has less acceleration at high speed.
     fn drive_rules(&self, machine: &Machine) -> Option<Box<DriveRules>> {
         let (mut slow, mut weak) = (self.clone(), self.clone());

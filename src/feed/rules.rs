@@ -91,14 +91,7 @@ impl PathRules {
 impl AxisRules {
     /// What every axis may do in a feed motion or rapid, in a block or blend.
     fn caps(&self, feed: &FeedCap, in_blend: bool) -> Vec<AxisCaps> {
-        let rules = match (&self.drive, feed) {
-            (None, _) => self,
-            (Some(drive), FeedCap::Rapid) => &drive.weak,
-            (Some(drive), FeedCap::Programmed(cap)) => {
-                let slowest_lu_s = drive.slow.feed_velocities_max_lu_s.iter().copied().fold(f64::INFINITY, f64::min);
-                if cap.velocity_lu_s <= slowest_lu_s { self } else { &drive.weak }
-            }
-        };
+        let rules = self.throughout(feed);
         let caps = |(limits, feed_velocity_lu_s): (&crate::machine::AxisLimits, &f64)| AxisCaps {
             velocity_max_lu_s: match feed {
                 FeedCap::Rapid => limits.velocity_max_lu_s * self.rapid_override_ratio,

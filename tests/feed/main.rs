@@ -2,6 +2,7 @@
 
 mod blocked;
 mod circular_contours;
+mod continuous;
 mod curves;
 mod printed_loop;
 mod profile;

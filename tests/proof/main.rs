@@ -204,8 +204,8 @@ fn seven_phase_transformed() {
     prove_transformed(Law::SevenPhase, |_| false);
 }
 
-/// Under `continuous` some limits are still exceeded by a little at a few places, and some times hang on where blocks end. Both are faults
-/// that are known; the strict tests below fail on them.
+/// Every limit holds. Of 300 programs a few take another time reversed, or with a block in two, by a little more than they should: that
+/// fault is known, and the strict test below fails on it.
 #[test]
 fn continuous() {
     prove(Law::Continuous, known);
@@ -213,7 +213,7 @@ fn continuous() {
 
 #[test]
 fn continuous_transformed() {
-    prove_transformed(Law::Continuous, known);
+    prove_transformed(Law::Continuous, |_| false);
 }
 
 #[test]
@@ -222,19 +222,11 @@ fn continuous_strict() {
     prove(Law::Continuous, |_| false);
 }
 
-#[test]
-#[ignore = "finds the faults that are known"]
-fn continuous_transformed_strict() {
-    prove_transformed(Law::Continuous, |_| false);
-}
-
-/// How far a finding under `continuous` may go before it is a new one. 3 of 300 programs exceed a jerk (most of them by less than
-/// 8 %), 6 a velocity or feed.
+/// How far a finding under `continuous` may go before it is a new one: 2 % of the time reversed where 0.5 % is meant, 0.1 % split.
 fn known(finding: &Finding) -> bool {
     match finding.kind {
-        Kind::Jerk | Kind::AccelerationStep => finding.ratio < 1.8,
-        Kind::Velocity | Kind::Feed => finding.ratio < 1.005,
-        Kind::Split | Kind::Reversed => true,
+        Kind::Reversed => finding.ratio < 4.0,
+        Kind::Split => finding.ratio < 5.0,
         _ => false,
     }
 }

@@ -131,8 +131,21 @@ impl Run {
         self.stretches.iter().map(|stretch| stretch.length_lu).sum()
     }
 
-    pub fn blends(&self) -> usize {
-        self.stretches.iter().filter(|stretch| stretch.blend).count()
+    /// Lengths of the blends: one that is cut short by a shorter block makes another path, also where the tip does not show it.
+    pub fn blends_lu(&self) -> Vec<f64> {
+        self.stretches.iter().filter(|stretch| stretch.blend).map(|stretch| stretch.length_lu).collect()
+    }
+
+    /// Places where the path rests.
+    pub fn rests(&self) -> usize {
+        self.joints.iter().filter(|joint| joint.rests).count()
+    }
+
+    /// The same stops and the same blends, in the same order.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let (own, others) = (self.blends_lu(), other.blends_lu());
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-7 * a.max(*b);
+        self.rests() == other.rests() && own.len() == others.len() && own.iter().zip(&others).all(near)
     }
 }
 

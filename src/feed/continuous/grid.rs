@@ -5,12 +5,13 @@
 //! interval is cut in two until the middle is what its ends make one expect ([`MISSED_RATIO`] of the greatest demand), and until it takes no longer
 //! than a part of a jerk phase where the speed may have to change. At a rest stands a short interval for the start, whose law is one of
 //! constant jerk.
-//! Does not plan the speed; the limits between the places are checked after planning (`check`).
+//! Does not plan the speed; the limits between the places are checked after planning (`held`).
 
-use super::super::LimitKind;
-use super::super::limits::AxisRules;
-use super::super::profile::SpeedCap;
 use crate::base::{AxisId, AxisVector};
+use crate::feed::LimitKind;
+use crate::feed::junction::STOP;
+use crate::feed::limits::AxisRules;
+use crate::feed::profile::SpeedCap;
 use crate::geometry::Curve;
 use crate::kinematics::{JointPath, JointState};
 use crate::machine::AxisLimits;
@@ -27,8 +28,11 @@ const STEP_SHARE: f64 = 0.25;
 const STEP_MIN_S: f64 = 5e-4;
 const STEP_MAX_S: f64 = 0.02;
 
+/// At a rest it takes at most this share of the least time for the piece.
+const SHORT_STEP_SHARE: f64 = 0.04;
+
 /// Within an interval the speed grows by this factor at most.
-const FASTER_MAX_RATIO: f64 = 2.0;
+const FASTER_MAX_RATIO: f64 = 1.35;
 
 /// Away from the ends of a piece an interval takes at most this share of the time to the nearer end.
 const GROWTH_SHARE: f64 = 0.3;
@@ -56,7 +60,7 @@ const LINE_RESERVE_RATIO: f64 = 0.998;
 const CURVE_RESERVE_RATIO: f64 = 0.992;
 
 /// Reserve of axis velocities, of the change of |q'| over an interval.
-const VELOCITY_RESERVE_RATIO: f64 = 0.02;
+const VELOCITY_RESERVE_RATIO: f64 = 0.05;
 
 /// An axis below this share of the greatest demands of all never comes near its limits.
 const IDLE_SHARE: f64 = 1e-3;
@@ -99,6 +103,8 @@ pub(super) struct Interval {
     pub cap: SpeedCap,
     /// Share of acceleration and jerk that planning uses.
     pub reserve_ratio: f64,
+    /// The reserve was made tighter since.
+    pub tightened: bool,
     pub bounds: Arc<Bounds>,
     straight: bool,
 }
@@ -203,12 +209,17 @@ struct Cutter<'a> {
 impl Grid {
     /// Cuts `path`, which moves and has no step of direction or curvature inside.
     pub fn new(rules: &AxisRules, path: &JointPath, blend: bool, ends: [End; 2]) -> Self {
-        Cutter::new(rules, path, blend, ends).cut()
+        Cutter::new(throughout(rules, path), path, blend, ends).cut()
     }
 }
 
+/// One set of rules for the whole piece.
+fn throughout<'a>(rules: &'a AxisRules, path: &JointPath) -> &'a AxisRules {
+    path.contour.curve().map_or(rules, |curve| rules.throughout(&rules.feed_cap(&path.contour.feed, curve)))
+}
+
 /// Highest constant speed at a place: feed and axis velocities, and the bend.
-pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &Derivatives) -> f64 {
+fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &Derivatives) -> f64 {
     let mut speed_lu_s = cap(rules, path, &[state]).velocity_lu_s;
     for (axis, limits) in AxisId::first(rules.axes.len()).zip(&rules.axes) {
         speed_lu_s = speed_lu_s.min((limits.acceleration_max_lu_s2 / state.second[axis].abs()).sqrt());
@@ -221,6 +232,7 @@ pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &D
 
 /// About the highest speeds at both ends of a piece: from its slow places on they grow with constant jerk.
 pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
+    let rules = throughout(rules, path);
     let length_lu = path.length_lu();
     let state_at = |s_lu: f64| Derivatives::from(path.at(s_lu));
     let speed_at = |s_lu: f64| constant_speed_lu_s(rules, path, &state_at(s_lu));
@@ -253,7 +265,7 @@ fn cap(rules: &AxisRules, path: &JointPath, states: &[&Derivatives]) -> SpeedCap
     };
     match path.contour.curve() {
         Some(curve) => rules.driven(rules.feed_cap(&path.contour.feed, curve), share),
-        None => super::super::junction::STOP,
+        None => STOP,
     }
 }
 
@@ -275,6 +287,15 @@ impl<'a> Cutter<'a> {
         let jerk = rules.largest(|axis, limits| start.first[axis].abs() / jerk_of(limits));
         let (acceleration_lu_s2, jerk_lu_s3) = (1.0 / acceleration.demand_ratio, 1.0 / jerk.demand_ratio);
         let phase_s = if jerk_limited { acceleration_lu_s2 / jerk_lu_s3 } else { STEP_MAX_S };
+        // From rest to rest in four phases of constant jerk, or in two of constant acceleration: the least that the piece can take.
+        let alone_s = if jerk_limited {
+            (32.0 * length_lu / jerk_lu_s3).cbrt()
+        } else {
+            2.0 * (length_lu / acceleration_lu_s2).sqrt()
+        };
+        let rests = ends.contains(&End::Rest);
+        let step_max_s = if rests { STEP_MAX_S.min(SHORT_STEP_SHARE * alone_s) } else { STEP_MAX_S };
+        let step_s = (STEP_SHARE * phase_s).max(STEP_MIN_S).min(step_max_s);
         Self {
             rules,
             path,
@@ -289,7 +310,7 @@ impl<'a> Cutter<'a> {
             }),
             acceleration_lu_s2,
             jerk_lu_s3,
-            step_s: (STEP_SHARE * phase_s).clamp(STEP_MIN_S, STEP_MAX_S),
+            step_s,
             top_lu_s: cap(rules, path, &[&start]).velocity_lu_s,
             intervals: Vec::new(),
         }
@@ -380,6 +401,7 @@ impl<'a> Cutter<'a> {
             states: [from.1, middle, to.1],
             cap,
             reserve_ratio,
+            tightened: false,
             bounds: self.bounds.clone(),
             straight: self.straight.is_some(),
         });

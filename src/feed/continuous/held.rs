@@ -5,7 +5,7 @@
 //! Does not plan.
 
 use super::chain::{Chain, Look, PathPoint, Profile};
-use super::grid::{Derivatives, Interval};
+use super::grid::{AxisBound, Derivatives, Interval};
 use crate::feed::{Limit, LimitKind};
 
 /// How far below the share that would just do.
@@ -14,11 +14,14 @@ const TIGHTER_RATIO: f64 = 0.995;
 /// A limit that is used so far at the eighths of an interval holds between them.
 const HELD_RATIO: f64 = 0.9995;
 
+/// A junction holds the speed where b comes this near to what it allows; of equals the junction is the weaker reason.
+const JUNCTION_SHARE: f64 = 0.999;
+
 /// A profile that uses a limit this many times is not slowed down but given up.
 const SLOWED_MAX_RATIO: f64 = 4.0;
 
 /// Above this use of a limit the curve itself is looked at.
-const NEAR_RATIO: f64 = 0.9;
+const NEAR_RATIO: f64 = 0.7;
 
 impl Profile {
     /// State inside an interval, `share` of its length from its start.
@@ -29,60 +32,59 @@ impl Profile {
         (PathPoint { speed_squared_lu2_s2: b, slope_lu_s2: point.slope_lu_s2 + x * bend }, bend)
     }
 
-    /// What holds the speed in an interval, and how far its limit is used at the middle; of the ends what is used most there.
+    /// What holds the speed in an interval: of the limits what is used most at its middle, of the junctions at its ends what is reached.
     pub fn limit(&self, chain: &Chain, index: usize) -> Limit {
         let interval = &chain.intervals[index];
-        let mut most = (0.0, interval.cap.limit);
+        let (point, bend) = self.inside(chain, index, 0.5);
+        let feed = (point.speed_squared_lu2_s2 / interval.cap.velocity_lu_s.powi(2), interval.cap.limit);
+        let mut most = feed;
         let mut offer = |used: f64, limit: Limit| {
             if used > most.0 {
                 most = (used, limit);
             }
         };
-        for (place, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
-            let (point, bend) = self.inside(chain, index, share);
-            let b = point.speed_squared_lu2_s2.max(0.0);
-            if place == 1 {
-                offer(b / interval.cap.velocity_lu_s.powi(2), interval.cap.limit);
-                let used = Used::at(interval, &interval.states[place], &point, bend);
-                offer(used.acceleration.0 / interval.reserve_ratio, used.acceleration.1);
-                offer(used.jerk.0 / interval.reserve_ratio, used.jerk.1);
-            } else if let Some(junction) = chain.junctions.get(index + place / 2) {
-                offer(0.999 * b / junction.speed_squared_lu2_s2, junction.limit);
+        for (used, limit) in used(interval, &interval.states[1], &point, bend) {
+            offer(used / interval.reserve_ratio, limit);
+        }
+        for border in [index, index + 1] {
+            if let Some(junction) = chain.junctions.get(border) {
+                let b = self.points[border].speed_squared_lu2_s2;
+                offer(JUNCTION_SHARE * b / junction.speed_squared_lu2_s2, junction.limit);
             }
         }
         most.1
     }
 }
 
-/// How far the limits are used at a place.
-struct Used {
-    acceleration: (f64, Limit),
-    jerk: (f64, Limit),
-}
-
-impl Used {
-    fn at(interval: &Interval, state: &Derivatives, point: &PathPoint, bend_per_s2: f64) -> Self {
-        let (b, slope) = (point.speed_squared_lu2_s2, point.slope_lu_s2);
-        let none = (0.0, interval.cap.limit);
-        let mut used = Self { acceleration: none, jerk: none };
-        for bound in &interval.bounds.axes {
-            let axis = bound.axis;
-            let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
-            let acceleration = (second * b + 0.5 * first * slope).abs() / bound.acceleration_lu_s2;
-            if acceleration > used.acceleration.0 || acceleration.is_nan() {
-                used.acceleration = (acceleration, Limit { kind: LimitKind::Acceleration, axis: Some(axis) });
-            }
-            let Some(limit) = bound.jerk_lu_s3 else { continue };
-            let jerk = (third * b + 1.5 * second * slope + 0.5 * first * bend_per_s2).abs() * b.max(0.0).sqrt() / limit;
-            if jerk > used.jerk.0 || jerk.is_nan() {
-                used.jerk = (jerk, Limit { kind: interval.bounds.jerk_kind, axis: Some(axis) });
+/// How far acceleration and jerk are used at a place, each by the axis that uses it most.
+fn used(interval: &Interval, state: &Derivatives, point: &PathPoint, bend_per_s2: f64) -> [(f64, Limit); 2] {
+    let b = point.speed_squared_lu2_s2.max(0.0);
+    let mut most = [(0.0, interval.cap.limit); 2];
+    for bound in &interval.bounds.axes {
+        let [acceleration, jerk] = demands(bound, state, point, bend_per_s2);
+        let jerk_limit = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
+        let uses = [
+            (acceleration.abs() / bound.acceleration_lu_s2, LimitKind::Acceleration),
+            (jerk.abs() * b.sqrt() / jerk_limit, interval.bounds.jerk_kind),
+        ];
+        for (most, (use_ratio, kind)) in most.iter_mut().zip(uses) {
+            if use_ratio > most.0 {
+                *most = (use_ratio, Limit { kind, axis: Some(bound.axis) });
             }
         }
-        used
     }
+    most
 }
 
-/// How much of its limits an interval uses at most, on the curve itself where it comes near them; NaN where b is not positive.
+/// Acceleration of an axis, and its jerk over √b (`chain`).
+fn demands(bound: &AxisBound, state: &Derivatives, point: &PathPoint, bend_per_s2: f64) -> [f64; 2] {
+    let (b, slope) = (point.speed_squared_lu2_s2, point.slope_lu_s2);
+    let [first, second, third] = [&state.first, &state.second, &state.third].map(|derivative| derivative[bound.axis]);
+    [second * b + 0.5 * first * slope, third * b + 1.5 * second * slope + 0.5 * first * bend_per_s2]
+}
+
+/// How much of its limits an interval uses at most, on the curve itself where it comes near them; NaN where b is not positive or a demand no
+/// number.
 fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
     let interval = &chain.intervals[index];
     if interval.is_straight() {
@@ -127,13 +129,14 @@ fn most_used(interval: &Interval, profile: &Profile, chain: &Chain, index: usize
     }
     let mut most = 0.0_f64;
     for bound in &interval.bounds.axes {
-        let axis = bound.axis;
         let (mut accelerations, mut jerks) = ([0.0; 9], [0.0; 9]);
         for (i, ((point, bend), state)) in places.iter().zip(states).enumerate() {
-            let (b, slope) = (point.speed_squared_lu2_s2, point.slope_lu_s2);
-            let (first, second, third) = (state.first[axis], state.second[axis], state.third[axis]);
-            accelerations[i] = second * b + 0.5 * first * slope;
-            jerks[i] = (third * b + 1.5 * second * slope + 0.5 * first * bend) * b.sqrt();
+            let [acceleration, jerk] = demands(bound, state, point, *bend);
+            accelerations[i] = acceleration;
+            jerks[i] = jerk * point.speed_squared_lu2_s2.sqrt();
+        }
+        if accelerations.iter().chain(&jerks).any(|demand| !demand.is_finite()) {
+            return f64::NAN;
         }
         most = most.max(summit(&accelerations) / bound.acceleration_lu_s2);
         if let Some(jerk) = bound.jerk_lu_s3 {
@@ -191,6 +194,7 @@ pub(super) fn tighten(chain: &mut Chain, profile: &Profile, range: &std::ops::Ra
         holds = false;
         let ratio = if most.is_nan() { 0.5 } else { (TIGHTER_RATIO / most).max(0.5) };
         chain.intervals[index].reserve_ratio *= ratio;
+        chain.intervals[index].tightened = true;
     }
     holds
 }

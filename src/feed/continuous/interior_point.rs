@@ -17,6 +17,7 @@
 struct Row {
     a: [f64; 3],
     bound: f64,
+    /// Never gives way.
     holds: bool,
     slack: f64,
     multiplier: f64,
@@ -205,10 +206,10 @@ impl Solver {
                 return Outcome::Solved;
             }
             self.factorise(problem);
-            self.backward(problem, 0.0, 0.0);
+            self.backward(problem, None);
             let predicted = self.predict(problem);
             let centring = (predicted.gap_after(gap) / gap).powi(3).min(1.0) * gap / count;
-            self.backward(problem, centring, 1.0);
+            self.backward(problem, Some(centring));
             let (primal, dual) = self.correct(problem, centring);
             let share = STEP_SHARE.max(1.0 - gap);
             step = (share * primal.min(dual)).min(1.0);
@@ -231,7 +232,6 @@ impl Solver {
                 let left = row.bound - row.along(&node.state, node.control);
                 row.slack = left.max(SLACK_START_MIN);
                 row.multiplier = product / row.slack;
-                row.correction = 0.0;
             }
             first = *end;
         }
@@ -314,19 +314,19 @@ impl Solver {
         }
     }
 
-    /// Newton's direction from the end to the start, for a complementarity product of `centring`, with a share of the correction of second
-    /// order; and the first step of the states.
-    fn backward(&mut self, problem: &Problem, centring: f64, corrected: f64) {
+    /// Newton's direction from the end to the start, and the first step of the states. `centring`: the product of slack and multiplier that it aims
+    /// at, with the correction of second order that [`Self::predict`] has found; `None`: the affine direction.
+    fn backward(&mut self, problem: &Problem, centring: Option<f64>) {
         let count = problem.transitions.len();
         let mut p = [0.0; 2];
         for i in (0..=count).rev() {
             let next = if i < count { self.nodes[i + 1].value } else { [0.0; 3] };
             let node = &mut self.nodes[i];
-            let g: [f64; 3] = std::array::from_fn(|k| {
-                let second_order =
-                    if corrected > 0.0 { centring * node.inward[k] - corrected * node.correction[k] } else { 0.0 };
-                node.force[k] + second_order
-            });
+            let mut g = node.force;
+            if let Some(centring) = centring {
+                let added = node.inward.iter().zip(node.correction).map(|(inward, second)| centring * inward - second);
+                g.iter_mut().zip(added).for_each(|(g, added)| *g += added);
+            }
             if i == count {
                 p = [g[0], g[1]];
                 continue;

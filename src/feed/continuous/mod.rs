@@ -21,6 +21,7 @@ use super::{Limit, LimitKind, TimeLaw};
 use crate::kinematics::JointPath;
 use chain::{Chain, Junction, Look, Planning, Profile, Start};
 use grid::{Derivatives, End, Grid};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// A plan reaches this many stopping distances beyond the piece that asks for it, if the window does.
@@ -62,15 +63,16 @@ pub(super) struct Continuous {
     chain: Chain,
     profile: Profile,
     /// Intervals of each piece that has not been handed out yet, front first.
-    pieces: std::collections::VecDeque<usize>,
+    pieces: VecDeque<usize>,
     /// Interval with which the front begins.
     first: usize,
     /// Intervals from the start of the chain whose law is kept.
     kept: usize,
     /// Intervals before this one are those of the pieces as they are.
     uncut: usize,
-    /// Intervals from here on brake for the end of the window.
+    /// Intervals from here on brake for the end of the window, and from there on they feel it.
     braking: usize,
+    disturbed: usize,
     /// The law of the front piece where there is no plan for it.
     refuge: Option<TimeLaw>,
 }
@@ -95,22 +97,20 @@ impl Continuous {
     }
 
     /// Plans again from the start of the front piece. `pieces`: the window in order, without what does not move, up to a rest at most.
-    /// `path_ends`: the last of them ends at rest for good.
     pub fn plan(&mut self, pieces: &mut [Piece<'_>]) {
         let start = self.start();
         let count = cut_pieces(pieces, start);
         let pieces = &pieces[..count];
-        let mut chain = Chain::default();
-        let mut counts = std::collections::VecDeque::new();
-        let mut firsts = Vec::with_capacity(count);
         let Some(last) = pieces.last() else { return };
         let rests = last.rests_after;
+        let mut chain = Chain::default();
+        let mut firsts = Vec::with_capacity(count);
         for (index, piece) in pieces.iter().enumerate() {
-            let before = chain.intervals.len();
+            firsts.push(chain.intervals.len());
             add_piece(&mut chain, piece, index == 0 && start == Start::Rest, index + 1 == count);
-            counts.push_back(chain.intervals.len() - before);
-            firsts.push(before);
         }
+        let ends = firsts.iter().skip(1).chain([&chain.intervals.len()]).copied().collect::<Vec<_>>();
+        let counts: VecDeque<usize> = firsts.iter().zip(ends).map(|(first, end)| end - first).collect();
         let look = |index: usize, s_lu: f64| {
             let piece = firsts.partition_point(|first| *first <= index).saturating_sub(1);
             Derivatives::from(pieces[piece].path.at(s_lu))
@@ -150,8 +150,11 @@ impl Continuous {
         let count = self.pieces.pop_front()?;
         let range = self.first..self.first + count;
         self.first = range.end;
-        let look_ahead = Limit { kind: LimitKind::LookAhead, axis: None };
-        let limit = |index| if index >= self.braking { look_ahead } else { self.profile.limit(&self.chain, index) };
+        let limit = |index| {
+            let limit = self.profile.limit(&self.chain, index);
+            let felt = index >= self.braking || (index >= self.disturbed && limit.axis.is_some());
+            if felt { Limit { kind: LimitKind::LookAhead, axis: None } } else { limit }
+        };
         Some(law::law(&self.chain, &self.profile, range, limit))
     }
 
@@ -165,7 +168,7 @@ impl Continuous {
     /// Decides how much of a new plan stays.
     fn keep(&mut self, rests: bool) {
         let count = self.chain.intervals.len();
-        (self.kept, self.braking) = (count, count);
+        (self.kept, self.braking, self.disturbed) = (count, count, count);
         if rests {
             return;
         }
@@ -180,6 +183,7 @@ impl Continuous {
         self.braking = summit;
         let kept_lu = ways[count] - DISTURBED_RATIO * (ways[count] - ways[summit]);
         self.kept = ways.partition_point(|way_lu| *way_lu <= kept_lu).saturating_sub(1);
+        self.disturbed = self.kept;
     }
 }
 

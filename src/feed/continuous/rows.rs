@@ -105,25 +105,34 @@ impl NodeRows<'_> {
         }
         self.hold([1.0 / cap_lu2_s2, 0.0, 0.0], 1.0);
         self.push([-1.0 / self.scale.b_lu2_s2, 0.0, 0.0], -LOWEST_RATIO);
-        self.acceleration(after, &after.states[0]);
-        if let Some(before) = before
-            && (before.states[2].second != after.states[0].second || before.states[2].first != after.states[0].first)
-        {
-            self.acceleration(before, &before.states[2]);
+        let Some(before) = before else {
+            self.acceleration(after, 0, 0.0, after.reserve_ratio);
+            return;
+        };
+        let (end, start) = (&before.states[2], &after.states[0]);
+        if end.first == start.first && end.second == start.second {
+            // One place of one curve: the tighter reserve of the two holds.
+            self.acceleration(after, 0, 0.0, after.reserve_ratio.min(before.reserve_ratio));
+        } else {
+            self.acceleration(after, 0, 0.0, after.reserve_ratio);
+            self.acceleration(before, 2, 0.0, before.reserve_ratio);
         }
     }
 
-    fn acceleration(&mut self, interval: &Interval, state: &Derivatives) {
+    /// Limits of the acceleration with the derivatives of one of the three places of an interval, `ahead_lu` after this node.
+    fn acceleration(&mut self, interval: &Interval, place: usize, ahead_lu: f64, reserve_ratio: f64) {
+        let state = &interval.states[place];
         let reach = Reach::of(interval, state, self.estimate_lu2_s2);
         for bound in leading(interval, |bound| bound.acceleration_lu_s2) {
             if !reach.accelerates(bound, state) {
                 continue;
             }
-            let limit = interval.reserve_ratio * bound.acceleration_lu_s2;
+            let limit = reserve_ratio * bound.acceleration_lu_s2;
             let (b, slope) = (state.second[bound.axis] / limit, 0.5 * state.first[bound.axis] / limit);
             if b != 0.0 || slope != 0.0 {
-                self.push([b, slope, 0.0], 1.0);
-                self.push([-b, -slope, 0.0], 1.0);
+                let row = ahead([b, slope, 0.0], ahead_lu);
+                self.push(row, 1.0);
+                self.push(row.map(|x| -x), 1.0);
             }
         }
     }
@@ -137,6 +146,9 @@ impl NodeRows<'_> {
             self.hold([1.0 / cap, 0.5 * h / cap, 0.0], 1.0);
             let lowest = self.scale.b_lu2_s2;
             self.push([-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO);
+        }
+        if !interval.is_straight() {
+            self.acceleration(interval, 1, 0.5 * h, interval.reserve_ratio);
         }
         let middle = 0.5 * (estimates[0] + estimates[1]);
         let places = [(0, estimates[0]), (1, middle), (2, estimates[1])];
@@ -158,19 +170,24 @@ impl NodeRows<'_> {
                 let x = 0.5 * place as f64 * h;
                 let tangent = 0.5 / estimate;
                 for sign in [1.0, -1.0] {
-                    let (b, slope, bend) = (sign * b + tangent, sign * slope, sign * bend);
-                    self.push([b, b * x + slope, 0.5 * b * x * x + slope * x + bend], 1.5);
+                    self.push(ahead([sign * b + tangent, sign * slope, sign * bend], x), 1.5);
                 }
             }
         }
     }
 }
 
+/// A row for the state `x` after a node, as a row for the state there: `b + x b' + x²/2 b''`, `b' + x b''`.
+fn ahead([b, slope, bend]: [f64; 3], x: f64) -> [f64; 3] {
+    [b, b * x + slope, 0.5 * b * x * x + slope * x + bend]
+}
+
 /// What can happen at a place, about: more than that the axes that lead do not allow. Limits of others that stay far from it are no rows;
 /// whether they hold is looked at afterwards.
 #[derive(Clone, Copy, Debug)]
 struct Reach {
-    straight: bool,
+    /// Every limit is a row: all are alike, or one of them was found to be exceeded.
+    all: bool,
     b: f64,
     acceleration: f64,
     jerk: f64,
@@ -180,19 +197,19 @@ impl Reach {
     fn of(interval: &Interval, state: &Derivatives, estimate: f64) -> Self {
         let b = REACH_RATIO * estimate;
         let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
-        let straight = interval.is_straight();
-        if !straight {
+        let all = interval.is_straight() || interval.tightened;
+        if !all {
             for bound in &interval.bounds.axes {
                 let (first, second) = (state.first[bound.axis].abs(), state.second[bound.axis].abs());
                 acceleration = acceleration.min((bound.acceleration_lu_s2 + second * b) / first);
             }
             for bound in &interval.bounds.axes {
-                let bend = Self { straight, b, acceleration, jerk: 0.0 }.jerk_demand(bound, state);
+                let bend = Self { all, b, acceleration, jerk: 0.0 }.jerk_demand(bound, state);
                 let limit = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
                 jerk = jerk.min((limit + bend) / state.first[bound.axis].abs());
             }
         }
-        Self { straight, b, acceleration, jerk }
+        Self { all, b, acceleration, jerk }
     }
 
     fn jerk_demand(&self, bound: &AxisBound, state: &Derivatives) -> f64 {
@@ -205,13 +222,13 @@ impl Reach {
     /// The axis may come near its acceleration.
     fn accelerates(&self, bound: &AxisBound, state: &Derivatives) -> bool {
         let (first, second) = (state.first[bound.axis].abs(), state.second[bound.axis].abs());
-        self.straight || (second * self.b + first * self.acceleration) / bound.acceleration_lu_s2 >= NEAR_RATIO
+        self.all || (second * self.b + first * self.acceleration) / bound.acceleration_lu_s2 >= NEAR_RATIO
     }
 
     /// The axis may come near its jerk.
     fn jerks(&self, bound: &AxisBound, state: &Derivatives) -> bool {
         let limit = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
-        self.straight || self.jerk_demand(bound, state) / limit >= NEAR_RATIO
+        self.all || self.jerk_demand(bound, state) / limit >= NEAR_RATIO
     }
 }
 
