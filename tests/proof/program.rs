@@ -121,6 +121,10 @@ impl Program {
 
     /// The same path the other way; `None` where modes change on the way.
     pub fn reversed(&self) -> Option<Self> {
+        // What a compressor makes of the points depends on where it begins.
+        if self.blocks.iter().any(|block| matches!(block, Block::Word(word) if word.starts_with("COMP"))) {
+            return None;
+        }
         let modes = self.blocks.iter().take_while(|block| matches!(block, Block::Word(_))).count();
         let (modes, motions) = self.blocks.split_at(modes);
         let mut blocks = modes.to_vec();

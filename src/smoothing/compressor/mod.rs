@@ -11,7 +11,7 @@
 //! | COMPCAD | the smoothest spline of degree 5 | at the ends of the run | fourth derivative |
 //! | COMPSURF | the same, from near points alone | at the ends of the run | fourth derivative |
 //!
-//! A block goes on as it is where the compressor is off, and where it is none of `compressor_blocks`, an exact stop, of rotary axes
+//! A block goes on as it is where the compressor is off, and where it is no line with feed, before an exact stop, of rotary axes
 //! alone, or longer than `compressor_length_max_mm`. A run ends where one of these stands, where a block has something to put out,
 //! where the modes change or feed and rapid meet, at corners of `compressor_corner_deg` or more, and where blocks are so long for
 //! their turn that no smooth curve is in the tolerance. Corners between blocks shorter than five tolerances are noise up to a right
