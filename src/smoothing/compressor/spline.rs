@@ -2,7 +2,7 @@
 //!
 //! In: the points of a run. Out: polynomials, each over several chords, that go on into each other up to the fourth derivative.
 //!
-//! Knots are programmed points, as far apart as the path bends little between them. The spline q minimises
+//! Knots are programmed points, with COMPCAD as far apart as the path bends little between them. The spline q minimises
 //!
 //! ```text
 //! sum over data  weight |p - q|²   +   sum over spans  stiffness  integral |q'''|² ds
@@ -14,12 +14,12 @@
 //! is cut in two. The stiff length changes slowly along the path: the third derivative would step with it. What passes is bounded, not
 //! sampled (`track`).
 //!
-//! A window of [`WINDOW_SPANS`] spans is solved at a time and its first half handed over; what was handed over before holds the first
+//! A window of some dozen spans is solved at a time and its first half handed over; what was handed over before holds the first
 //! coefficients fast. What points do to the curve decays within a few spans, so that the second half is enough to look ahead.
 //!
 //! COMPCAD keeps the stiffness of one window for the next and lets it grow as far as the tolerance allows. COMPSURF begins every
-//! window with the same stiffness, which follows from the tolerance alone, spaces its knots more closely and makes the same rounds
-//! everywhere: the curve at a place follows from the points near it, whichever way and from wherever the path comes, so that
+//! window with the same stiffness, which follows from the tolerance alone, has a knot at every point, looks twice as far ahead and makes
+//! the same rounds everywhere: the curve at a place follows from the points near it, whichever way and from wherever the path comes, so that
 //! neighbouring passes over a surface come out alike.
 //!
 //! Where nothing keeps the tolerance the blocks stay straight. Does not know blocks: that is `track`.
@@ -29,10 +29,6 @@ use super::track::Track;
 use super::window::{Part, Window};
 use crate::base::AxisVector;
 use std::collections::VecDeque;
-
-/// Spans of a window, and how many of them are only looked at.
-const WINDOW_SPANS: usize = 48;
-const AHEAD_SPANS: usize = 24;
 
 /// Rounds in which spans become stiffer or softer, and rounds that only make them softer.
 const ROUNDS: usize = 4;
@@ -52,13 +48,30 @@ pub(super) struct Style {
     target_share: f64,
     /// The stiffness goes on from window to window.
     remembers: bool,
+    /// Spans of a window, and how many of them are only looked at.
+    window_spans: usize,
+    ahead_spans: usize,
 }
 
 /// COMPCAD.
-pub(super) const CAD: Style = Style { chords_max: 12, rise_max_ratio: 5.0, target_share: 0.6, remembers: true };
+pub(super) const CAD: Style = Style {
+    chords_max: 12,
+    rise_max_ratio: 5.0,
+    target_share: 0.6,
+    remembers: true,
+    window_spans: 48,
+    ahead_spans: 24,
+};
 
 /// COMPSURF.
-pub(super) const SURFACE: Style = Style { chords_max: 4, rise_max_ratio: 1.0, target_share: 0.3, remembers: false };
+pub(super) const SURFACE: Style = Style {
+    chords_max: 1,
+    rise_max_ratio: 1.0,
+    target_share: 0.3,
+    remembers: false,
+    window_spans: 96,
+    ahead_spans: 48,
+};
 
 /// The spline of a run.
 #[derive(Clone, Debug)]
@@ -137,10 +150,10 @@ impl Spline {
             self.close(self.open);
             self.open = 0;
         }
-        while !self.parts.is_empty() && (ending || self.parts.len() >= WINDOW_SPANS) {
-            let count = self.parts.len().min(WINDOW_SPANS);
+        while !self.parts.is_empty() && (ending || self.parts.len() >= self.style.window_spans) {
+            let count = self.parts.len().min(self.style.window_spans);
             let last = ending && count == self.parts.len();
-            let wanted = if last { count } else { count.saturating_sub(AHEAD_SPANS).max(1) };
+            let wanted = if last { count } else { count.saturating_sub(self.style.ahead_spans).max(1) };
             let solved = self.solve(track, count, last, wanted);
             match solved {
                 Some((window, passed)) if passed > 0 => self.commit(track, &window, passed, last, ready),
