@@ -1,7 +1,7 @@
 //! The kernel as a library and as a loop: snapshot, threads, determinism, figures, alarms.
 
 use sollwert::base::{AxisKind, MachinePoint};
-use sollwert::feed::{Limit, LimitKind};
+use sollwert::feed::{Limit, LimitKind, OverrideSchedule};
 use sollwert::kernel::{Figures, FollowOptions, Kernel, RunOptions, RunOutcome, RunSummary, SetpointTable, Status};
 use sollwert::kernel::{follow, run};
 use sollwert::machine::{Loaded, load};
@@ -44,6 +44,7 @@ fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutco
     let options = RunOptions {
         machine,
         setup: program(text).into(),
+        overrides: OverrideSchedule::none(),
         drives: true,
         recording: Some(path),
         mantissa_bits: None,
@@ -137,6 +138,7 @@ fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
     let options = RunOptions {
         machine: &loaded,
         setup: program(PROGRAM).into(),
+        overrides: OverrideSchedule::none(),
         drives: false,
         recording: None,
         mantissa_bits: None,

@@ -9,7 +9,8 @@
 //! met; it is exact where the speed at the end is settled.) A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
 //! Does not sample, and does not know axes: `limits` and `junction` do.
 
-use super::continuous::{Continuous, Flow, Piece};
+use super::continuous::{Continuous, Flow};
+use super::feed_override::{OverrideCourse, OverrideSchedule};
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
 use super::modes::ModeRules;
@@ -27,6 +28,8 @@ use crate::program::BlockRef;
 use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
+
+mod flowing;
 
 /// Plans speeds over a window of the path.
 #[derive(Clone, Debug)]
@@ -66,6 +69,8 @@ pub struct Planner {
     half_blend_lu: f64,
     /// The law `continuous`; `None` under `seven-phase`.
     continuous: Option<Box<Continuous>>,
+    /// The feed override at run time.
+    overrides: OverrideCourse,
 }
 
 /// A piece in the window or before it.
@@ -136,7 +141,14 @@ impl Planner {
             stalled: None,
             half_blend_lu: 0.0,
             continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
+            overrides: OverrideCourse::new(&OverrideSchedule::none(), machine.cycle.time_base),
         }
+    }
+
+    /// With changes of the feed override at run time, which only `continuous` follows.
+    pub fn with_overrides(self, schedule: &OverrideSchedule) -> Self {
+        let time_base = self.rules.machine().cycle.time_base;
+        Self { overrides: OverrideCourse::new(schedule, time_base), ..self }
     }
 
     /// Time of everything that has been handed out, and of the motions with feed among it.
@@ -267,11 +279,13 @@ impl Planner {
                 None => front.fixed(self.entry, ahead, self.setpoint_period_s),
             },
         };
+        let start_s = self.elapsed_s;
         self.elapsed_s += law.duration_s();
+        let overrides = self.overrides.steps(start_s, self.elapsed_s);
         if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_)) && front.path.contour.feed != Feed::Rapid {
             self.cutting_s += law.duration_s();
         }
-        let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings };
+        let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings, overrides };
         self.entry = exit;
         self.admitted -= 1;
         self.changed_from = self.changed_from.saturating_sub(1);
@@ -312,36 +326,6 @@ impl Planner {
                 None
             }
         }
-    }
-
-    /// The law of the front piece under `continuous`; `None` where it does not move.
-    fn flow(&mut self) -> Option<TimeLaw> {
-        let ends_path = self.window_ends_path();
-        let Self { continuous, entries, admitted, .. } = self;
-        let continuous = continuous.as_mut()?;
-        if !matches!(entries.front()?.motion, Motion::Flows(_)) {
-            return None;
-        }
-        if !continuous.holds_front() {
-            let mut pieces: Vec<Piece<'_>> = Vec::new();
-            for (index, entry) in entries.range_mut(..*admitted).take(PLANNED_PIECES_MAX).enumerate() {
-                let Entry { path, motion, corner, rests_after, .. } = entry;
-                if index > 0 && corner.velocity_lu_s == 0.0 {
-                    pieces.last_mut()?.rests_after = true;
-                    break;
-                }
-                let rests_after = *rests_after || (ends_path && index + 1 == *admitted);
-                match motion {
-                    Motion::Flows(flow) => pieces.push(Piece { path, flow, junction: *corner, rests_after }),
-                    _ => pieces.last_mut()?.rests_after |= rests_after,
-                }
-                if rests_after {
-                    break;
-                }
-            }
-            continuous.plan(&mut pieces);
-        }
-        continuous.take_front()
     }
 
     /// Lets pieces into the window, as many as it may hold: a blend only together with the block after it.

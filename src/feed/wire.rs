@@ -135,6 +135,25 @@ impl TimeLaw {
         self.duration_s
     }
 
+    /// What happens between two times, as phases.
+    pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = Phase> + '_ {
+        self.phases.iter().zip(&self.starts_s).filter_map(move |(phase, start_s)| {
+            let begin_s = (from_s - start_s).max(0.0);
+            let duration_s = phase.duration_s.min(to_s - start_s) - begin_s;
+            if begin_s == 0.0 {
+                return (duration_s > 0.0).then_some(Phase { duration_s, ..*phase });
+            }
+            let state = phase.at(begin_s);
+            (duration_s > 0.0).then_some(Phase {
+                duration_s,
+                start_lu: state.position_lu,
+                velocity_lu_s: state.velocity_lu_s,
+                acceleration_lu_s2: state.acceleration_lu_s2,
+                ..*phase
+            })
+        })
+    }
+
     /// State `time_s` after the start of the piece; clamped to its ends. A law without phases is at rest at 0.
     pub fn at(&self, time_s: f64) -> PathState {
         let index = self.starts_s.partition_point(|start_s| *start_s < time_s).saturating_sub(1);
@@ -217,6 +236,25 @@ pub struct PlannedPiece {
     pub buffered_blocks: u32,
     /// Axes that set out on their own when the piece begins; empty for most.
     pub positionings: Vec<AxisMotion>,
+    /// The feed override at its start, and its changes after that; empty where it is 100 % from end to end.
+    pub overrides: Vec<OverrideStep>,
+}
+
+/// The feed override from a time on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OverrideStep {
+    /// From the start of the piece.
+    pub from_s: f64,
+    /// 1: the programmed feed.
+    pub override_ratio: f64,
+}
+
+impl PlannedPiece {
+    /// The feed override `time_s` after the start of the piece.
+    pub fn override_ratio(&self, time_s: f64) -> f64 {
+        let before = self.overrides.iter().take_while(|step| step.from_s <= time_s);
+        before.last().map_or(1.0, |step| step.override_ratio)
+    }
 }
 
 /// A motion of one axis beside the path, final.

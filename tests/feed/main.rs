@@ -4,6 +4,7 @@ mod blocked;
 mod circular_contours;
 mod continuous;
 mod curves;
+mod overrides;
 mod printed_loop;
 mod profile;
 mod programmed_time;

@@ -128,6 +128,24 @@ pub(super) enum End {
     Speed(f64),
 }
 
+/// What of a piece is cut.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// From the start of the piece.
+    pub from_lu: f64,
+    pub to_lu: f64,
+    pub ends: [End; 2],
+    /// So long the speed may change at the start, whatever the ends are.
+    pub settling_s: f64,
+}
+
+impl Stretch {
+    /// All of a piece, from rest to rest.
+    pub fn whole(path: &JointPath) -> Self {
+        Self { from_lu: 0.0, to_lu: path.length_lu(), ends: [End::Rest; 2], settling_s: 0.0 }
+    }
+}
+
 impl Interval {
     pub fn length_lu(&self) -> f64 {
         self.end_lu - self.start_lu
@@ -193,8 +211,12 @@ struct Cutter<'a> {
     rules: &'a AxisRules,
     path: &'a JointPath,
     blend: bool,
-    length_lu: f64,
+    /// The stretch that is cut, from the start of the piece.
+    from_lu: f64,
+    to_lu: f64,
     ends: [End; 2],
+    /// So long the speed may change at the start, whatever the ends are.
+    settling_s: f64,
     /// A straight piece has the same derivatives everywhere.
     straight: Option<Derivatives>,
     bounds: Arc<Bounds>,
@@ -207,9 +229,9 @@ struct Cutter<'a> {
 }
 
 impl Grid {
-    /// Cuts `path`, which moves and has no step of direction or curvature inside.
-    pub fn new(rules: &AxisRules, path: &JointPath, blend: bool, ends: [End; 2]) -> Self {
-        Cutter::new(throughout(rules, path), path, blend, ends).cut()
+    /// Cuts a stretch of `path`, which moves and has no step of direction or curvature inside.
+    pub fn of_stretch(rules: &AxisRules, path: &JointPath, blend: bool, stretch: &Stretch) -> Self {
+        Cutter::new(throughout(rules, path), path, blend, stretch).cut()
     }
 }
 
@@ -270,9 +292,10 @@ fn cap(rules: &AxisRules, path: &JointPath, states: &[&Derivatives]) -> SpeedCap
 }
 
 impl<'a> Cutter<'a> {
-    fn new(rules: &'a AxisRules, path: &'a JointPath, blend: bool, ends: [End; 2]) -> Self {
-        let length_lu = path.length_lu();
-        let start = Derivatives::from(path.at(0.0));
+    fn new(rules: &'a AxisRules, path: &'a JointPath, blend: bool, stretch: &Stretch) -> Self {
+        let Stretch { from_lu, to_lu, ends, settling_s } = *stretch;
+        let length_lu = to_lu - from_lu;
+        let start = Derivatives::from(path.at(from_lu));
         let straight = path.is_straight().then_some(start);
         let jerk_limited = rules.jerk_limited;
         let jerk_of =
@@ -300,8 +323,10 @@ impl<'a> Cutter<'a> {
             rules,
             path,
             blend,
-            length_lu,
+            from_lu,
+            to_lu,
             ends,
+            settling_s,
             straight,
             bounds: Arc::new(Bounds {
                 axes,
@@ -317,12 +342,12 @@ impl<'a> Cutter<'a> {
     }
 
     fn cut(mut self) -> Grid {
-        let mut borders = vec![0.0];
+        let mut borders = vec![self.from_lu];
         let rests = self.ends.map(|end| end == End::Rest);
         if rests[0] {
-            borders.push(self.rest_lu());
+            borders.push(self.from_lu + self.rest_lu());
         }
-        let inside = [borders[borders.len() - 1], self.length_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
+        let inside = [borders[borders.len() - 1], self.to_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
         let knots: Vec<f64> = match self.path.contour.curve() {
             Some(Curve::Polynomial(curve)) if self.path.is_contour() => curve.knots_lu().collect(),
             _ if self.path.is_contour() => Vec::new(),
@@ -330,14 +355,14 @@ impl<'a> Cutter<'a> {
         };
         borders.extend(knots.into_iter().filter(|s_lu| *s_lu > inside[0] && *s_lu < inside[1]));
         if rests[1] {
-            borders.push(self.length_lu - self.rest_lu());
+            borders.push(self.to_lu - self.rest_lu());
         }
-        borders.push(self.length_lu);
+        borders.push(self.to_lu);
         for range in borders.windows(2) {
             self.cut_range(range[0], range[1]);
         }
         self.drop_idle_axes();
-        let half_lu = 0.5 * self.length_lu;
+        let half_lu = 0.5 * (self.to_lu - self.from_lu);
         let v = self.ends.iter().fold(self.top_lu_s, |v, end| v.min(self.reached_lu_s(*end, half_lu)));
         let ramp_s = v / self.acceleration_lu_s2
             + if self.bounds.jerk_limited { self.acceleration_lu_s2 / self.jerk_lu_s3 } else { 0.0 };
@@ -352,15 +377,15 @@ impl<'a> Cutter<'a> {
         } else {
             self.acceleration_lu_s2 * t * t / 2.0
         };
-        lu.min(REST_SHARE * self.length_lu)
+        lu.min(REST_SHARE * (self.to_lu - self.from_lu))
     }
 
     fn cut_range(&mut self, start_lu: f64, end_lu: f64) {
         let inside = BESIDE_RATIO * (end_lu - start_lu);
         let at_start = self.look(if start_lu > 0.0 { start_lu + inside } else { 0.0 });
-        let at_end = self.look(if end_lu < self.length_lu { end_lu - inside } else { end_lu });
-        let rest = (self.ends[0] == End::Rest && start_lu == 0.0)
-            || (self.ends[1] == End::Rest && end_lu == self.length_lu && start_lu > 0.0);
+        let at_end = self.look(if end_lu < self.path.length_lu() { end_lu - inside } else { end_lu });
+        let rest = (self.ends[0] == End::Rest && start_lu == self.from_lu)
+            || (self.ends[1] == End::Rest && end_lu == self.to_lu && start_lu > self.from_lu);
         let mut from = (start_lu, at_start);
         let mut waiting = vec![((end_lu, at_end), 0)];
         let cuts_min = self.cuts_min();
@@ -415,11 +440,11 @@ impl<'a> Cutter<'a> {
     fn quick(&self, start_lu: f64, end_lu: f64, middle: &Derivatives) -> bool {
         let middle_lu = 0.5 * (start_lu + end_lu);
         let held_lu_s = constant_speed_lu_s(self.rules, self.path, middle);
-        let distances = [middle_lu, self.length_lu - middle_lu];
+        let distances = [middle_lu - self.from_lu, self.to_lu - middle_lu];
         let mut speed_lu_s = held_lu_s;
         let half_lu = 0.5 * (end_lu - start_lu);
         let mut near_s = f64::INFINITY;
-        let mut ramp_s = 0.0_f64;
+        let mut ramp_s = self.settling_s;
         for (end, distance_lu) in self.ends.iter().zip(distances) {
             let reached_lu_s = self.reached_lu_s(*end, distance_lu);
             let nearer_lu_s = self.reached_lu_s(*end, distance_lu - half_lu);
