@@ -135,23 +135,10 @@ impl TimeLaw {
         self.duration_s
     }
 
-    /// What happens between two times, as phases.
-    pub(super) fn between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = Phase> + '_ {
-        self.phases.iter().zip(&self.starts_s).filter_map(move |(phase, start_s)| {
-            let begin_s = (from_s - start_s).max(0.0);
-            let duration_s = phase.duration_s.min(to_s - start_s) - begin_s;
-            if begin_s == 0.0 {
-                return (duration_s > 0.0).then_some(Phase { duration_s, ..*phase });
-            }
-            let state = phase.at(begin_s);
-            (duration_s > 0.0).then_some(Phase {
-                duration_s,
-                start_lu: state.position_lu,
-                velocity_lu_s: state.velocity_lu_s,
-                acceleration_lu_s2: state.acceleration_lu_s2,
-                ..*phase
-            })
-        })
+    /// The phases up to a time.
+    pub(super) fn until(&self, time_s: f64) -> impl Iterator<Item = Phase> + '_ {
+        let begun = self.phases.iter().zip(&self.starts_s).take_while(move |(_, start_s)| **start_s < time_s);
+        begun.map(move |(phase, start_s)| Phase { duration_s: phase.duration_s.min(time_s - start_s), ..*phase })
     }
 
     /// State `time_s` after the start of the piece; clamped to its ends. A law without phases is at rest at 0.

@@ -77,7 +77,7 @@ fn a_change_on_a_line_takes_the_time_and_the_way_of_the_closed_form() {
         let (time_s, way_lu) = ramp(&machine, 100.0, percent);
         let (from, to) = (1000, reaches(&rows, 1000, percent));
         // Nothing knows of the change before it comes.
-        assert_eq!(axes(&rows[..=from]), axes(&plain[..=from]));
+        assert!(axes(&rows[..=from]) == axes(&plain[..=from]), "{percent} %");
         let took_s = (to - from) as f64 * T_S;
         let went_lu = rows[to].path.path_length_mm - rows[from].path.path_length_mm;
         println!("{percent} %: {took_s} of {time_s} s, {went_lu} of {way_lu} mm");
@@ -105,7 +105,7 @@ fn nothing_is_a_stop_and_a_wait_in_the_middle_of_a_block() {
     println!("0 %: {took_s} of {time_s} s, {went_lu} of {way_lu} mm");
     assert!((took_s / time_s - 1.0).abs() < 0.08, "{took_s} of {time_s} s");
     assert!((went_lu / way_lu - 1.0).abs() < 0.05, "{went_lu} of {way_lu} mm");
-    assert!(still.iter().all(|row| row.path.limit.kind == LimitKind::Override));
+    assert!(still[1..].iter().all(|row| row.path.limit.kind == LimitKind::Override));
     let again_s = (reaches(&rows, 3001, 100.0) - 3000) as f64 * T_S;
     assert!((again_s / time_s - 1.0).abs() < 0.08, "{again_s} of {time_s} s");
     // The whole costs what the stop costs.
@@ -161,7 +161,8 @@ fn same_path(machine: &Machine, program: &Program, overrides: &str) {
 
 #[test]
 fn every_limit_holds_through_random_changes_on_rounded_polylines() {
-    for seed in 0..12 {
+    let seeds = std::env::var("SEED").ok().map_or(0..12, |seed| seed.parse().map(|seed: u64| seed..seed + 1).unwrap());
+    for seed in seeds {
         let mut random = Random::new(700 + seed);
         let machine = Machine { look_ahead_blocks: [2, 8, 60][seed as usize % 3], ..machine() };
         let walk = random.walk(40, 0.05, [40.0, 4.0][seed as usize % 2]);
@@ -209,7 +210,7 @@ fn rapids_are_left_alone() {
     let mut program = Program::new(PathMode::G64, 3000.0);
     program.rapid(&[200.0]);
     let [plain, slow] = ["0=100", "0.1=20,0.2=0,0.3=10"].map(|overrides| setpoints(&machine, &program, overrides));
-    assert_eq!(axes(&plain), axes(&slow));
+    assert!(axes(&plain) == axes(&slow));
     // With 0 % they end before the first block with a feed.
     program.line(&[260.0]);
     let rows = setpoints(&machine, &program, "0.1=0,4=100");

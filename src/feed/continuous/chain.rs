@@ -43,6 +43,8 @@ pub(super) struct Chain {
     pub intervals: Vec<Interval>,
     /// Highest b at the start of each interval, from junctions; infinite where there is none.
     pub junctions: Vec<Junction>,
+    /// Lowest b at the first borders; there may be none at all.
+    pub floors_lu2_s2: Vec<f64>,
 }
 
 /// What a border between pieces allows.
@@ -226,8 +228,10 @@ impl Planning {
         }
         problem.costs_ratio.iter_mut().for_each(|cost| *cost /= total);
         for k in 0..=count {
+            let floor = |k: usize| chain.floors_lu2_s2.get(first + k).copied().unwrap_or(0.0);
             let mut node = NodeRows {
                 problem,
+                floors_lu2_s2: [floor(k), floor(k + 1)],
                 scale: scale(k),
                 fixed: k == 0 && start != Start::Rest,
                 estimate_lu2_s2: estimate[k],

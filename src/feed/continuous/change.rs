@@ -8,7 +8,7 @@
 
 use super::along::Along;
 use super::chain::{Chain, PathPoint, Profile, Start};
-use super::grid::{Grid, Stretch};
+use super::grid::{Grid, Settling, Stretch};
 use super::interval::{Interval, Tangent};
 use super::layout::Layout;
 use super::regime::rapids;
@@ -31,6 +31,10 @@ const NEAR_END_SHARE: f64 = 0.05;
 /// A stop this share of its way from the end of a piece is one at its end.
 const NEAR_BORDER_SHARE: f64 = 2e-3;
 
+/// On the way, and this many times as far, the speed stays above this share of the new feed: it does not fall below what it is to come to.
+const FLOOR_RATIO: f64 = 0.997;
+const FLOOR_WAYS: f64 = 1.5;
+
 /// By how much the speeds of the plan before may be exceeded on the way.
 const LOOSE_RATIO: f64 = 1.002;
 
@@ -43,6 +47,14 @@ pub(in crate::feed) enum Change {
     Nothing,
     /// There is no such plan yet: that before goes on.
     NotYet,
+}
+
+/// What a change will take, about.
+#[derive(Clone, Copy, Debug, Default)]
+struct Expected {
+    way_lu: f64,
+    /// So far before the plan before comes down to the new feed a plan with that may have to leave it.
+    landing_lu: f64,
 }
 
 /// A plan over a way to another feed or to a rest.
@@ -124,7 +136,8 @@ impl Continuous {
     /// At rest: no plan before matters.
     fn begin(&mut self, pieces: &mut [Piece<'_>], override_ratio: f64) {
         self.places.clear();
-        (self.chain, self.profile, self.first, self.kept) = (Chain::default(), Profile::default(), 0, 0);
+        (self.chain, self.profile) = (Chain::default(), Profile::default());
+        (self.first, self.kept, self.uncut, self.braking, self.disturbed) = (0, 0, 0, 0, 0);
         let regime = &mut self.regime;
         (regime.settling_lu, regime.point) = (0.0, None);
         if override_ratio > 0.0 {
@@ -142,15 +155,18 @@ impl Continuous {
     /// Another feed above 0.
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
         let before = std::mem::replace(&mut self.regime.moving_ratio, override_ratio);
-        let (guess_lu, most_lu) = (self.expect(pieces, start, false), self.way_left_lu());
+        let Expected { way_lu: guess_lu, landing_lu } = self.expect(pieces, start, false);
         let count = self.reach(pieces, 0, start);
         let pieces = &mut pieces[..count];
         let layout = self.layout(pieces, 0, start);
         let rests = pieces.last().is_some_and(|last| last.rests_after);
         let pieces = &*pieces;
+        let most_lu = self.above_lu(&layout.chain);
         let mut attempt = |way_lu: f64, longer: Option<&Trial>| {
             let mut layout = layout.clone();
             if way_lu > 0.0 {
+                let floor_lu = (FLOOR_WAYS * way_lu).min(most_lu - landing_lu);
+                layout.chain.floors_lu2_s2 = self.floors(&layout.chain, floor_lu);
                 self.settle(&mut layout, pieces, way_lu);
             }
             self.trial(layout, pieces, start, way_lu, longer)
@@ -160,6 +176,7 @@ impl Continuous {
             self.regime.moving_ratio = before;
             return false;
         };
+        let (layout, profile) = self.refined(layout, profile, pieces, start);
         self.adopt(layout, profile, rests);
         self.regime.settling_lu = way_lu;
         true
@@ -178,7 +195,7 @@ impl Continuous {
             }
             pieces[rapids - 1].rests_after = rested;
         }
-        let (guess_lu, most_lu) = (self.expect(pieces, start, true), self.way_left_lu());
+        let (guess_lu, most_lu) = (self.expect(pieces, start, true).way_lu, self.way_left_lu());
         let count = self.reach(pieces, 0, start);
         let pieces = &mut pieces[..count];
         let found = shortest(guess_lu, most_lu, |way_lu, longer| {
@@ -213,6 +230,16 @@ impl Continuous {
         Some(Trial { profile: profile?, layout, way_lu })
     }
 
+    /// The same plan without haste, if it can be improved.
+    fn refined(&mut self, layout: Layout, profile: Profile, pieces: &[Piece<'_>], start: Start) -> (Layout, Profile) {
+        let mut again = layout.clone();
+        let better = self.planning.plan(&mut again.chain, start, &profile.points, &look(pieces, &layout.owners));
+        match better {
+            Some(better) => (again, better),
+            None => (layout, profile),
+        }
+    }
+
     /// A chain that ends at rest so far from where the front stands, and how many pieces it reaches.
     fn layout_to_stop(&mut self, pieces: &mut [Piece<'_>], start: Start, way_lu: f64) -> (Layout, usize) {
         let near_lu = NEAR_BORDER_SHARE * way_lu;
@@ -236,9 +263,9 @@ impl Continuous {
         (layout, last + 1)
     }
 
-    /// Prepares the grids for a change from where the front stands: the way that it will take, about.
-    fn expect(&mut self, pieces: &mut [Piece<'_>], start: Start, stops: bool) -> f64 {
-        let (Some(front), Start::At(point)) = (pieces.first_mut(), start) else { return 0.0 };
+    /// Prepares the grids for a change from where the front stands.
+    fn expect(&mut self, pieces: &mut [Piece<'_>], start: Start, stops: bool) -> Expected {
+        let (Some(front), Start::At(point)) = (pieces.first_mut(), start) else { return Expected::default() };
         self.regime.look(front);
         front.flow.grid = None;
         let (v, a) = (point.speed_squared_lu2_s2.sqrt(), 0.5 * point.slope_lu_s2);
@@ -251,16 +278,48 @@ impl Continuous {
             [a.abs(), acceleration_lu_s2].map(|a| if jerk_limited { a / jerk_lu_s3 } else { 0.0 });
         // The speed that the acceleration leads to before it can be taken away.
         let led_lu_s = (v + 0.5 * a * phase_s).max(0.0);
-        let time_s = dynamics.ramp(led_lu_s, target_lu_s).duration_s() + phase_s + full_s;
-        self.regime.transition = Some([time_s, time_s * v.max(target_lu_s)]);
         let way_lu = dynamics.ramp_length_lu(led_lu_s, target_lu_s) + a.signum() * v * phase_s;
-        FIRST_RATIO * way_lu.max(WAY_SHARE * v * time_s)
+        let way_lu = way_lu.max(WAY_SHARE * v * full_s);
+        self.regime.transition = Some(Settling { way_lu, speed_lu_s: v });
+        Expected { way_lu: FIRST_RATIO * way_lu, landing_lu: 2.0 * target_lu_s * full_s }
     }
 
     /// Way of the plan before from where the front stands.
     fn way_left_lu(&self) -> f64 {
         let left = self.chain.intervals.get(self.first..).unwrap_or(&[]);
         left.iter().map(Interval::length_lu).sum::<f64>() - self.offset_lu()
+    }
+
+    /// Way from where the front stands to where the plan before comes down to the caps of a new chain.
+    fn above_lu(&self, chain: &Chain) -> f64 {
+        let mut before = Along::new(&self.chain, &self.profile, self.first, self.offset_lu());
+        let (mut at_lu, mut above) = (0.0, false);
+        for interval in &chain.intervals {
+            let Some(b) = before.at(at_lu) else { break };
+            let over = b > interval.cap.velocity_lu_s * interval.cap.velocity_lu_s;
+            if above && !over {
+                return at_lu;
+            }
+            above |= over;
+            at_lu += interval.length_lu();
+        }
+        if above { at_lu } else { 0.0 }
+    }
+
+    /// b at the borders of a chain up to a way that must not be fallen below: what the new feed and the plan before have in common.
+    fn floors(&self, chain: &Chain, way_lu: f64) -> Vec<f64> {
+        let mut before = Along::new(&self.chain, &self.profile, self.first, self.offset_lu());
+        let (mut at_lu, mut cap_lu_s) = (0.0, f64::INFINITY);
+        let floor = |interval: &Interval| {
+            if at_lu > way_lu {
+                return None;
+            }
+            let lower_lu_s = interval.cap.velocity_lu_s.min(std::mem::replace(&mut cap_lu_s, interval.cap.velocity_lu_s));
+            let b = before.at(at_lu)?.min(lower_lu_s * lower_lu_s);
+            at_lu += interval.length_lu();
+            Some(FLOOR_RATIO * FLOOR_RATIO * b)
+        };
+        chain.intervals.iter().map_while(floor).collect()
     }
 
     /// Over a way from where the front stands the caps give way to the speeds of the plan before; a border is made where it ends.
@@ -316,6 +375,9 @@ fn shortest(
 ) -> Option<Trial> {
     let mut low_lu = 0.0;
     let mut found: Option<Trial> = None;
+    if most_lu.is_nan() || most_lu <= 0.0 {
+        return None;
+    }
     let (mut next_lu, mut longer_ratio) = (guess_lu.min(most_lu), LONGER_RATIO);
     for _ in 0..WAYS_MAX {
         match attempt(next_lu, found.as_ref()) {

@@ -35,6 +35,9 @@ const INTERVALS_MAX: usize = 20_000;
 /// The interval at a rest is at most this share of its piece.
 const REST_SHARE: f64 = 0.15;
 
+/// Intervals are short up to this share beyond the way that a change is expected to take.
+const SETTLED_SHARE: f64 = 0.3;
+
 /// Beside a knot of a spline its derivatives are taken this share of the range inside.
 const BESIDE_RATIO: f64 = 1e-9;
 
@@ -64,14 +67,39 @@ pub(super) struct Stretch {
     pub from_lu: f64,
     pub to_lu: f64,
     pub ends: [End; 2],
-    /// So long the speed may change at its start, whatever the ends are.
-    pub settling_s: f64,
+    /// At its start the speed still changes.
+    pub settling: Settling,
+}
+
+/// A change of the speed at the start of a stretch, whatever its ends allow.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Settling {
+    /// The way that it takes, about; 0: there is none.
+    pub way_lu: f64,
+    /// The speed that it begins with.
+    pub speed_lu_s: f64,
+}
+
+impl Settling {
+    /// No more than the speed on the way down, some way after its start; `None` well beyond its end.
+    pub fn speed_at(&self, way_lu: f64) -> Option<f64> {
+        let left_share = 1.0 - way_lu / self.way_lu;
+        (left_share > -SETTLED_SHARE).then(|| self.speed_lu_s * left_share.max(0.0))
+    }
+
+    /// What is left of it some way after its start.
+    pub fn after(&self, way_lu: f64) -> Self {
+        match self.speed_at(way_lu) {
+            Some(speed_lu_s) if speed_lu_s > 0.0 => Self { way_lu: self.way_lu - way_lu, speed_lu_s },
+            _ => Self::default(),
+        }
+    }
 }
 
 impl Stretch {
     /// All of a piece.
     pub fn whole(path: &JointPath, ends: [End; 2]) -> Self {
-        Self { from_lu: 0.0, to_lu: path.length_lu(), ends, settling_s: 0.0 }
+        Self { from_lu: 0.0, to_lu: path.length_lu(), ends, settling: Settling::default() }
     }
 
     fn length_lu(&self) -> f64 {
@@ -260,7 +288,7 @@ impl<'a> Cutter<'a> {
         let mut speed_lu_s = held_lu_s;
         let half_lu = 0.5 * (end_lu - start_lu);
         let mut near_s = f64::INFINITY;
-        let mut ramp_s = self.stretch.settling_s;
+        let mut ramp_s = 0.0_f64;
         for (end, distance_lu) in self.stretch.ends.iter().zip(distances) {
             let reached_lu_s = self.reached_lu_s(*end, distance_lu);
             let nearer_lu_s = self.reached_lu_s(*end, distance_lu - half_lu);
@@ -274,7 +302,10 @@ impl<'a> Cutter<'a> {
             let phase_s = self.tangent.step_s / STEP_SHARE;
             ramp_s = ramp_s.max((held_lu_s - from_lu_s) / self.tangent.acceleration_lu_s2 + phase_s);
         }
-        let away_s = GROWTH_SHARE * (near_s - ramp_s).max(0.0);
+        let mut away_s = GROWTH_SHARE * (near_s - ramp_s).max(0.0);
+        if let Some(settling_lu_s) = self.stretch.settling.speed_at(distances[0]) {
+            (speed_lu_s, away_s) = (speed_lu_s.max(settling_lu_s), 0.0);
+        }
         end_lu - start_lu <= speed_lu_s * self.tangent.step_s.max(away_s)
     }
 

@@ -112,6 +112,10 @@ impl Layout {
         self.chain.intervals[index] = before;
         self.chain.intervals.insert(index + 1, after);
         self.chain.junctions.insert(index + 1, free);
+        let floors = &mut self.chain.floors_lu2_s2;
+        if let [from, to, ..] = floors[index.min(floors.len())..] {
+            floors.insert(index + 1, from.min(to));
+        }
         self.owners.insert(index + 1, self.owners[index]);
         for Place { intervals, .. } in &mut self.places {
             intervals.start += usize::from(intervals.start > index);

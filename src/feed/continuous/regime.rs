@@ -4,7 +4,7 @@
 
 use super::Piece;
 use super::chain::PathPoint;
-use super::grid::{End, Stretch};
+use super::grid::{End, Settling, Stretch};
 use crate::feed::limits::AxisRules;
 use crate::kinematics::JointPath;
 use std::sync::Arc;
@@ -25,8 +25,8 @@ pub(super) struct Regime {
     pub from_lu: f64,
     /// The state there, if it is not that at the start of the plan.
     pub point: Option<PathPoint>,
-    /// Time and way that a change takes, about, while it is planned.
-    pub transition: Option<[f64; 2]>,
+    /// What a change takes, about, while it is planned.
+    pub transition: Option<Settling>,
     /// Rules under the override that were asked for last, with those that they come from.
     overridden: Option<(Arc<AxisRules>, f64, Arc<AxisRules>)>,
 }
@@ -48,7 +48,7 @@ impl Default for Regime {
 impl Regime {
     /// How far a plan must look beyond the front.
     pub fn reach_lu(&self) -> f64 {
-        let change_lu = self.transition.map_or(0.0, |[_, way_lu]| way_lu);
+        let change_lu = self.transition.map_or(0.0, |change| change.way_lu);
         REACH_RATIO * change_lu.max(self.settling_lu)
     }
 
@@ -96,12 +96,9 @@ impl Regime {
 
     /// What is cut of a piece that begins so far ahead; `None`: the front.
     pub fn stretch(&self, path: &JointPath, ends: [End; 2], ahead_lu: Option<f64>) -> Stretch {
-        let settling_s = match self.transition {
-            Some([time_s, way_lu]) if ahead_lu.unwrap_or(0.0) < way_lu => time_s,
-            _ => 0.0,
-        };
+        let settling = self.transition.unwrap_or_default().after(ahead_lu.unwrap_or(0.0));
         let from_lu = if ahead_lu.is_none() { self.from_lu } else { 0.0 };
-        Stretch { from_lu, settling_s, ..Stretch::whole(path, ends) }
+        Stretch { from_lu, settling, ..Stretch::whole(path, ends) }
     }
 }
 

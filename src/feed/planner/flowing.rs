@@ -134,16 +134,16 @@ impl Course<'_> {
             let next_s = (self.overrides.next_s() - self.now_s).min(retry_s).max(0.0);
             let left_s = law.duration_s() - at_s;
             if next_s >= left_s - near_end_s {
-                self.phases.extend(law.between(at_s, law.duration_s()));
+                self.phases.extend(law.phases());
                 self.now_s += left_s;
                 return true;
             }
-            self.phases.extend(law.between(at_s, at_s + next_s));
             at_s += next_s;
             self.now_s += next_s;
             self.overrides.advance(self.now_s);
             continuous.stand(&law.at(at_s));
             if self.take_override(continuous, window) {
+                self.phases.extend(law.until(at_s));
                 return false;
             }
         }
