@@ -2,9 +2,10 @@
 
 use crate::support::{Program, Random, plan, plan_under, sample, spinner};
 use sollwert::base::AxisId;
-use sollwert::feed::{LimitKind, OverrideSchedule};
+use sollwert::feed::{LimitKind, OverrideSchedule, PlannedPiece};
 use sollwert::interpolator::{Interpolator, Setpoint};
 use sollwert::kernel::{PieceSource, Preparation};
+use sollwert::kinematics::JointPath;
 use sollwert::machine::{BlendShape, Machine, PathMode, TimeLawKind};
 use sollwert::program::ProgramSource;
 
@@ -57,10 +58,20 @@ fn ramp(machine: &Machine, from_lu_s: f64, to_lu_s: f64) -> (f64, f64) {
     (time_s, 0.5 * (from_lu_s + to_lu_s) * time_s)
 }
 
-/// The first set-point from `k` on from which the feed stays at `feed_lu_s` for ten cycles.
+/// A feed this near another one has reached it.
+const REACHED_SHARE: f64 = 0.01;
+
+/// The first set-point from `k` on from which the feed stays near `feed_lu_s` for ten cycles.
 fn reaches(rows: &[Setpoint], k: usize, feed_lu_s: f64) -> usize {
-    let there = |row: &Setpoint| (row.path.feed_lu_s - feed_lu_s).abs() <= 1e-3 * feed_lu_s;
+    let there = |row: &Setpoint| (row.path.feed_lu_s - feed_lu_s).abs() <= REACHED_SHARE * feed_lu_s;
     (k..rows.len()).find(|k| rows[*k..].iter().take(10).all(there)).expect("the feed is reached")
+}
+
+/// Time and way of a change of speed until the new one is near: the end of the ramp has constant jerk.
+fn ramp_to_near(machine: &Machine, from_lu_s: f64, to_lu_s: f64) -> (f64, f64) {
+    let (time_s, way_lu) = ramp(machine, from_lu_s, to_lu_s);
+    let near_s = (2.0 * REACHED_SHARE * to_lu_s / machine.axes[0].limits.jerk_max_lu_s3).sqrt();
+    (time_s - near_s, way_lu - near_s * to_lu_s)
 }
 
 fn axes(rows: &[Setpoint]) -> Vec<sollwert::base::PerAxis<sollwert::interpolator::AxisSetpoint>> {
@@ -74,15 +85,19 @@ fn a_change_on_a_line_takes_the_time_and_the_way_of_the_closed_form() {
     for percent in [5.0, 10.0, 50.0, 90.0, 110.0, 150.0, 200.0] {
         let rows = setpoints(&machine, &line(), &format!("1={percent}"));
         holds(&machine, &rows, &format!("{percent} %"));
-        let (time_s, way_lu) = ramp(&machine, 100.0, percent);
+        let (time_s, way_lu) = ramp_to_near(&machine, 100.0, percent);
         let (from, to) = (1000, reaches(&rows, 1000, percent));
         // Nothing knows of the change before it comes.
         assert!(axes(&rows[..=from]) == axes(&plain[..=from]), "{percent} %");
         let took_s = (to - from) as f64 * T_S;
         let went_lu = rows[to].path.path_length_mm - rows[from].path.path_length_mm;
         println!("{percent} %: {took_s} of {time_s} s, {went_lu} of {way_lu} mm");
-        assert!((took_s / time_s - 1.0).abs() < 0.08, "{percent} %: {took_s} of {time_s} s");
+        assert!((took_s - time_s).abs() < 0.05 * time_s + 1.5 * T_S, "{percent} %: {took_s} of {time_s} s");
         assert!((went_lu / way_lu - 1.0).abs() < 0.06, "{percent} %: {went_lu} of {way_lu} mm");
+        // It does not fall below, or rise above, what it comes to.
+        let beyond = |row: &Setpoint| (row.path.feed_lu_s - percent) * (percent - 100.0).signum();
+        let most = rows[from..to + 300].iter().map(beyond).fold(0.0, f64::max);
+        assert!(most < 0.005 * percent, "{percent} %: {most} mm/s beyond");
         assert_eq!([from - 1, from].map(|k| rows[k].path.override_ratio), [1.0, percent / 100.0]);
         // Exactly the new feed.
         let cruise = &rows[to + 200].path;
@@ -107,7 +122,7 @@ fn nothing_is_a_stop_and_a_wait_in_the_middle_of_a_block() {
     assert!((went_lu / way_lu - 1.0).abs() < 0.05, "{went_lu} of {way_lu} mm");
     assert!(still[1..].iter().all(|row| row.path.limit.kind == LimitKind::Override));
     let again_s = (reaches(&rows, 3001, 100.0) - 3000) as f64 * T_S;
-    assert!((again_s / time_s - 1.0).abs() < 0.08, "{again_s} of {time_s} s");
+    assert!((again_s / ramp_to_near(&machine, 0.0, 100.0).0 - 1.0).abs() < 0.05, "{again_s} of {time_s} s");
     // The whole costs what the stop costs.
     let plain = setpoints(&machine, &line(), "0=100");
     let longer_s = (rows.len() - plain.len()) as f64 * T_S;
@@ -129,6 +144,18 @@ fn the_programmed_feed_and_no_change_are_the_same_to_the_last_bit() {
     }
 }
 
+/// Segments that turn so much that every corner is rounded: where a corner is too flat for a blend the velocity of an axis steps.
+fn walk(random: &mut Random, longest_mm: f64) -> Vec<[f64; 2]> {
+    let (mut at, mut direction_rad) = ([0.0, 0.0], random.between(0.0, 6.3));
+    let mut step = || {
+        let length_mm = random.logarithmic(0.05, longest_mm);
+        at = [at[0] + length_mm * direction_rad.cos(), at[1] + length_mm * direction_rad.sin()];
+        direction_rad += random.between(0.1, 2.6) * if random.unit() < 0.5 { -1.0 } else { 1.0 };
+        at
+    };
+    (0..40).map(|_| step()).collect()
+}
+
 /// Times up to `end_s` with random percentages; the last one lets the path move.
 fn schedule(random: &mut Random, end_s: f64) -> String {
     let mut changes = Vec::new();
@@ -148,29 +175,29 @@ fn schedule(random: &mut Random, end_s: f64) -> String {
     changes.join(",")
 }
 
-/// The path of the set-points is that of the program: each lies on a piece of it.
-fn same_path(machine: &Machine, program: &Program, overrides: &str) {
-    let planned = plan_under(machine, overrides, program.paths(machine));
-    for (piece, path) in planned.iter().zip(program.paths(machine)) {
-        assert_eq!(piece.path.contour.kind, path.contour.kind, "{overrides}");
+/// The path is that of the program, from end to end.
+fn same_path(planned: &[PlannedPiece], paths: &[JointPath], what: &str) {
+    assert_eq!(planned.len(), paths.len(), "{what}");
+    for (piece, path) in planned.iter().zip(paths) {
+        assert!(piece.path.contour.kind == path.contour.kind, "{what}");
         let (length_lu, law) = (path.length_lu(), &piece.law);
-        let end = law.at(law.duration_s());
-        assert!((end.position_lu - length_lu).abs() < 1e-9 * (1.0 + length_lu), "{overrides}: {end:?} of {length_lu}");
+        let end_lu = law.at(law.duration_s()).position_lu;
+        assert!((end_lu - length_lu).abs() < 1e-9 * (1.0 + length_lu), "{what}: ends at {end_lu} of {length_lu}");
     }
 }
 
 #[test]
 fn every_limit_holds_through_random_changes_on_rounded_polylines() {
-    let seeds = std::env::var("SEED").ok().map_or(0..12, |seed| seed.parse().map(|seed: u64| seed..seed + 1).unwrap());
-    for seed in seeds {
+    for seed in 0..10 {
         let mut random = Random::new(700 + seed);
         let machine = Machine { look_ahead_blocks: [2, 8, 60][seed as usize % 3], ..machine() };
-        let walk = random.walk(40, 0.05, [40.0, 4.0][seed as usize % 2]);
+        let walk = walk(&mut random, [40.0, 4.0][seed as usize % 2]);
         let program = Program::polyline(PathMode::G642, random.logarithmic(500.0, 12_000.0), &walk);
         let overrides = schedule(&mut random, 6.0);
         let what = format!("seed {seed} --override {overrides}");
-        holds(&machine, &setpoints(&machine, &program, &overrides), &what);
-        same_path(&machine, &program, &overrides);
+        let planned = plan_under(&machine, &overrides, program.paths(&machine));
+        same_path(&planned, &program.paths(&machine), &what);
+        holds(&machine, &sample(&machine, planned), &what);
     }
 }
 

@@ -38,6 +38,9 @@ const REST_SHARE: f64 = 0.15;
 /// Intervals are short up to this share beyond the way that a change is expected to take.
 const SETTLED_SHARE: f64 = 0.3;
 
+/// There an interval takes this share of the usual time.
+const SETTLING_STEP_RATIO: f64 = 0.5;
+
 /// Beside a knot of a spline its derivatives are taken this share of the range inside.
 const BESIDE_RATIO: f64 = 1e-9;
 
@@ -303,10 +306,11 @@ impl<'a> Cutter<'a> {
             ramp_s = ramp_s.max((held_lu_s - from_lu_s) / self.tangent.acceleration_lu_s2 + phase_s);
         }
         let mut away_s = GROWTH_SHARE * (near_s - ramp_s).max(0.0);
+        let mut step_s = self.tangent.step_s;
         if let Some(settling_lu_s) = self.stretch.settling.speed_at(distances[0]) {
-            (speed_lu_s, away_s) = (speed_lu_s.max(settling_lu_s), 0.0);
+            (speed_lu_s, step_s, away_s) = (speed_lu_s.max(settling_lu_s), SETTLING_STEP_RATIO * step_s, 0.0);
         }
-        end_lu - start_lu <= speed_lu_s * self.tangent.step_s.max(away_s)
+        end_lu - start_lu <= speed_lu_s * step_s.max(away_s)
     }
 
     /// About the speed that is reached at a distance from an end.
