@@ -28,12 +28,14 @@ pub(super) struct Layout {
     pub places: VecDeque<Place>,
     /// The piece with which each interval begins.
     pub owners: Vec<usize>,
+    /// Intervals from here on are there for the stop at the end only.
+    pub uncut: usize,
 }
 
 impl Layout {
     /// The intervals of the pieces at `places`, which follow each other.
     pub fn continued<'a>(chain: &Chain, places: impl Iterator<Item = &'a Place>) -> Self {
-        let mut layout = Self::default();
+        let mut layout = Self { uncut: usize::MAX, ..Self::default() };
         let mut shift = None;
         for (piece, place) in places.enumerate() {
             let shift = *shift.get_or_insert(place.intervals.start);
@@ -75,6 +77,7 @@ impl Layout {
                 }
             }
         }
+        self.uncut = self.uncut.min(self.chain.intervals.len());
     }
 
     /// Appends the grid of a piece; where the plan begins or ends at rest there and the grid was not made for it, the first or last interval is cut.
@@ -96,6 +99,7 @@ impl Layout {
             if cut_last && index + 1 == count {
                 let from = borders.pop().unwrap_or(interval.start_lu);
                 let rest_lu = interval.end_lu - from;
+                self.uncut = self.chain.intervals.len();
                 borders.extend(CUTS_RATIO.iter().rev().map(|ratio| interval.end_lu - ratio * rest_lu));
             }
             if borders.is_empty() {

@@ -77,6 +77,8 @@ pub(super) struct Continuous {
     first: usize,
     /// Intervals from the start of the chain whose law is kept.
     kept: usize,
+    /// Intervals from here on are there for the stop at the end of the window only.
+    uncut: usize,
     /// Intervals from here on brake for the end of the window, and from there on they feel it.
     braking: usize,
     disturbed: usize,
@@ -139,8 +141,7 @@ impl Continuous {
         let rests = last.rests_after;
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
         layout.extend(pieces, known, stretches, start == Start::Rest);
-        let Layout { mut chain, places, .. } = layout;
-        let owners: Vec<usize> = layout.owners;
+        let Layout { mut chain, places, owners, uncut } = layout;
         let look = |index: usize, s_lu: f64| {
             let paths = pieces[owners[index]..].iter().map(|piece| piece.path);
             let place = group::place(paths, s_lu).unwrap_or((pieces[owners[index]].path, s_lu));
@@ -154,7 +155,8 @@ impl Continuous {
             }
             return;
         };
-        (self.chain, self.profile, self.places, self.first) = (chain, profile, places, 0);
+        (self.chain, self.profile, self.places) = (chain, profile, places);
+        (self.first, self.uncut) = (0, uncut);
         self.keep(rests);
     }
 
@@ -182,7 +184,7 @@ impl Continuous {
 
     /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
     fn hints(&self, chain: &Chain) -> (Vec<PathPoint>, usize) {
-        let end = self.places.back().map_or(self.first, |last| last.intervals.start);
+        let end = self.uncut.max(self.first);
         let (mut points, mut fast) = (Vec::with_capacity(chain.intervals.len()), 0);
         let (mut index, mut way_lu) = (self.first, 0.0);
         for interval in &chain.intervals {
