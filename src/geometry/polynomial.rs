@@ -37,6 +37,8 @@ pub struct PolynomialCurve {
     /// Arc length of the whole where this part begins.
     offset_lu: f64,
     length_lu: f64,
+    /// The parameter at both ends, in the first and the last panel.
+    ends_ratio: [f64; 2],
     /// Added to the pieces: at the start of the whole, and per arc length.
     shift: AxisVector,
     shift_slope: AxisVector,
@@ -49,8 +51,13 @@ impl PolynomialCurve {
         let table = Arc::new(ArcLengthTable::new(geometry.clone(), linear));
         let length_lu = table.length_lu();
         let panels = [0, table.panels().len().saturating_sub(1)];
+        let ends_ratio = match table.panels() {
+            [] => [0.0; 2],
+            [first, ..] => [first.ends_ratio[0], table.panels()[panels[1]].ends_ratio[1]],
+        };
         let mut curve = Self {
             table,
+            ends_ratio,
             start,
             end,
             panels,
@@ -131,8 +138,6 @@ impl PolynomialCurve {
     /// The part from `start_lu` to `end_lu`, both inside the curve and in order.
     pub(super) fn trimmed(&self, start_lu: f64, end_lu: f64) -> Self {
         let mut part = self.clone();
-        part.start = self.at(start_lu).position;
-        part.end = self.at(end_lu).position;
         part.offset_lu = self.offset_lu + start_lu;
         part.length_lu = end_lu - start_lu;
         let (from_lu, to_lu) = (part.offset_lu, self.offset_lu + end_lu);
@@ -143,6 +148,14 @@ impl PolynomialCurve {
         let [low, high] = self.panels;
         let first = (low + first).min(high);
         part.panels = [first, (low + last).max(first).min(high)];
+        if start_lu > 0.0 {
+            part.ends_ratio[0] = part.parameter_at(0.0);
+            part.start = part.state_at(0.0).position;
+        }
+        if end_lu < self.length_lu {
+            part.ends_ratio[1] = part.parameter_at(part.length_lu);
+            part.end = part.state_at(part.length_lu).position;
+        }
         part
     }
 
@@ -151,16 +164,34 @@ impl PolynomialCurve {
         self.table.panels().get(first..=last).unwrap_or(&[])
     }
 
+    /// The panel in which the place `s_lu` of this part lies.
+    fn panel_at(&self, s_lu: f64) -> Option<&Panel> {
+        let (panels, along_lu) = (self.own_panels(), self.offset_lu + s_lu);
+        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(panels.len().saturating_sub(1));
+        panels.get(index)
+    }
+
+    /// The parameter there.
+    fn parameter_at(&self, s_lu: f64) -> f64 {
+        self.panel_at(s_lu).map_or(0.0, |panel| self.table.parameter_at(panel, self.offset_lu + s_lu))
+    }
+
     /// The pieces with what is added to them at s of this part.
     fn state_at(&self, s_lu: f64) -> CurveState {
         let along_lu = self.offset_lu + s_lu;
-        let panels = self.own_panels();
-        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(panels.len().saturating_sub(1));
-        let Some(panel) = panels.get(index) else {
+        // The ends are asked for most, and their parameters are known.
+        let (panel, known) = if s_lu <= 0.0 {
+            (self.own_panels().first(), Some(self.ends_ratio[0]))
+        } else if s_lu >= self.length_lu {
+            (self.own_panels().last(), Some(self.ends_ratio[1]))
+        } else {
+            (self.panel_at(s_lu), None)
+        };
+        let Some(panel) = panel else {
             let still = AxisVector::zero();
             return CurveState { position: self.start, first: still, second: still, third: still };
         };
-        let u = self.table.parameter_at(panel, along_lu);
+        let u = known.unwrap_or_else(|| self.table.parameter_at(panel, along_lu));
         let mut state = self.pieces_at(panel, u);
         state.position.0 += self.shift + self.shift_slope * along_lu;
         state.first += self.shift_slope;
