@@ -4,7 +4,7 @@ use super::support::*;
 use sollwert::base::{AxisId, AxisVector};
 use sollwert::geometry::Curve;
 use sollwert::interpreter::{ArcGeometry, Compressor, Feed, Move, MoveKind};
-use sollwert::machine::{CompressorBlocks, Machine, PathMode};
+use sollwert::machine::{BlendShape, CompressorBlocks, Machine, PathMode};
 use sollwert::smoothing::{ContourPiece, PieceKind};
 
 const KINDS: [Compressor; 4] = [Compressor::On, Compressor::Curvature, Compressor::Cad, Compressor::Surface];
@@ -293,7 +293,7 @@ fn compressor_and_blend_together_keep_the_tolerance() {
     let mut blends = 0;
     for mode in [PathMode::G642, PathMode::G643, PathMode::G645] {
         for compressor in KINDS {
-            for seed in 1..=3 {
+            for seed in 1..=2 {
                 let what = format!("{mode:?} {compressor:?}, seed {seed}");
                 let (moves, pieces) = compressed(&cornered(seed, mode), compressor, &machine);
                 check_contour(&moves, &pieces, &what);
@@ -312,5 +312,26 @@ fn compressor_and_blend_together_keep_the_tolerance() {
             }
         }
     }
-    assert!(blends > 300, "{blends}");
+    assert!(blends > 200, "{blends}");
+}
+
+#[test]
+fn a_point_that_the_compressor_moved_is_not_moved_beyond_the_tolerance_by_the_blend() {
+    // Found by tests/proof: C turns back in a corner of blocks so short that the corner is noise; the curve of the first one ends off
+    // its point, the second one stays a line, and the corner between them is rounded.
+    let mut machine = machine();
+    machine.smoothing.shape = BlendShape::Quintic;
+    let point = vec![0.1743, -0.1449, 0.0, 0.6529_f64.to_radians()];
+    let moves = polyline(&[point.clone(), vec![0.3949, -0.0288, 0.0, 0.2382_f64.to_radians()]]);
+    let (_, pieces) = compressed(&moves, Compressor::Cad, &machine);
+    assert_eq!(corners(&pieces).len(), 1, "{}", kinds(&pieces));
+    let missed = |q: AxisVector| {
+        let off = q - vector(&point);
+        let linear_mm = vector(&off.as_slice()[..3]).norm();
+        let rotary_rad = off.as_slice()[3].abs();
+        let settings = &machine.smoothing;
+        (linear_mm / settings.contour_tolerance_mm).max(rotary_rad / settings.orientation_tolerance_rad)
+    };
+    let least = curves(&pieces).into_iter().flat_map(samples).map(missed).fold(f64::INFINITY, f64::min);
+    assert!(least <= 1.0, "missed by {least} tolerances");
 }
