@@ -148,13 +148,20 @@ impl PolynomialCurve {
         let [low, high] = self.panels;
         let first = (low + first).min(high);
         part.panels = [first, (low + last).max(first).min(high)];
-        if start_lu > 0.0 {
-            part.ends_ratio[0] = part.parameter_at(0.0);
-            part.start = part.state_at(0.0).position;
+        // Places are those of the whole, so that neighbours meet to the last bit.
+        if start_lu > 0.0
+            && let Some((index, u)) = self.place(start_lu)
+        {
+            part.start = self.state_in(index, u, from_lu).position;
+            let border = self.table.panels()[part.panels[0]].ends_ratio[0];
+            part.ends_ratio[0] = if index == part.panels[0] { u } else { border };
         }
-        if end_lu < self.length_lu {
-            part.ends_ratio[1] = part.parameter_at(part.length_lu);
-            part.end = part.state_at(part.length_lu).position;
+        if end_lu < self.length_lu
+            && let Some((index, u)) = self.place(end_lu)
+        {
+            part.end = self.state_in(index, u, to_lu).position;
+            let border = self.table.panels()[part.panels[1]].ends_ratio[1];
+            part.ends_ratio[1] = if index == part.panels[1] { u } else { border };
         }
         part
     }
@@ -164,35 +171,36 @@ impl PolynomialCurve {
         self.table.panels().get(first..=last).unwrap_or(&[])
     }
 
-    /// The panel in which the place `s_lu` of this part lies.
-    fn panel_at(&self, s_lu: f64) -> Option<&Panel> {
-        let (panels, along_lu) = (self.own_panels(), self.offset_lu + s_lu);
-        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(panels.len().saturating_sub(1));
-        panels.get(index)
-    }
-
-    /// The parameter there.
-    fn parameter_at(&self, s_lu: f64) -> f64 {
-        self.panel_at(s_lu).map_or(0.0, |panel| self.table.parameter_at(panel, self.offset_lu + s_lu))
+    /// The panel in which the place `s_lu` of this part lies, and the parameter there; `None`: nothing moves.
+    fn place(&self, s_lu: f64) -> Option<(usize, f64)> {
+        let panels = self.own_panels();
+        let last = panels.len().checked_sub(1)?;
+        // The ends are asked for most, and their parameters are known.
+        if s_lu <= 0.0 {
+            return Some((self.panels[0], self.ends_ratio[0]));
+        }
+        if s_lu >= self.length_lu {
+            return Some((self.panels[1], self.ends_ratio[1]));
+        }
+        let along_lu = self.offset_lu + s_lu;
+        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(last);
+        Some((self.panels[0] + index, self.table.parameter_at(&panels[index], along_lu)))
     }
 
     /// The pieces with what is added to them at s of this part.
     fn state_at(&self, s_lu: f64) -> CurveState {
-        let along_lu = self.offset_lu + s_lu;
-        // The ends are asked for most, and their parameters are known.
-        let (panel, known) = if s_lu <= 0.0 {
-            (self.own_panels().first(), Some(self.ends_ratio[0]))
-        } else if s_lu >= self.length_lu {
-            (self.own_panels().last(), Some(self.ends_ratio[1]))
-        } else {
-            (self.panel_at(s_lu), None)
-        };
-        let Some(panel) = panel else {
-            let still = AxisVector::zero();
-            return CurveState { position: self.start, first: still, second: still, third: still };
-        };
-        let u = known.unwrap_or_else(|| self.table.parameter_at(panel, along_lu));
-        let mut state = self.pieces_at(panel, u);
+        match self.place(s_lu) {
+            Some((index, u)) => self.state_in(index, u, self.offset_lu + s_lu),
+            None => {
+                let still = AxisVector::zero();
+                CurveState { position: self.start, first: still, second: still, third: still }
+            }
+        }
+    }
+
+    /// The same in a panel at u, `along_lu` from the start of the whole.
+    fn state_in(&self, panel: usize, u: f64, along_lu: f64) -> CurveState {
+        let mut state = self.pieces_at(&self.table.panels()[panel], u);
         state.position.0 += self.shift + self.shift_slope * along_lu;
         state.first += self.shift_slope;
         state
