@@ -5,8 +5,8 @@
 
 use super::axis_catalogue::{AXIS, DRIVE, DYNAMICS, ENCODER, MECHANICS, MOTOR};
 use super::checked::{
-    AccelerationMode, ArcLimits, BlendLaw, BlendLimits, BlendShape, CornerRule, CurvatureJump, FineInterpolation,
-    PathMode, TimeLawKind,
+    AccelerationMode, ArcLimits, BlendLaw, BlendLimits, BlendShape, CompressorBlocks, CornerRule, CurvatureJump,
+    FineInterpolation, PathMode, TimeLawKind,
 };
 use super::choices::{Carries, KinematicsType, words};
 use super::keys::{Absent, Accepts, Key, Range, TableKeys};
@@ -209,6 +209,14 @@ const SMOOTHING: &[Key] = &[
         "factor of the tolerances between two rapids without STOLF",
     )
     .md("MD20560"),
+    Key::new(
+        "compressor_blocks",
+        "",
+        Choice(words::<CompressorBlocks>),
+        Word("lines"),
+        "blocks that the compressor takes: G1 (hundreds digit 0), and circles (1), and G0 (2), and both (3)",
+    )
+    .md("MD20482"),
     Key::new(
         "compressor_length_max_mm",
         "mm",

@@ -198,6 +198,31 @@ pub enum BlendLimits {
     Path,
 }
 
+/// `[smoothing] compressor_blocks` (MD20482, hundreds): blocks that the compressor takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CompressorBlocks {
+    /// G1 (0).
+    Lines,
+    /// G1, G2, G3, CIP, CT (1).
+    Arcs,
+    /// G1 and G0 (2).
+    Rapids,
+    /// All of them (3).
+    All,
+}
+
+impl CompressorBlocks {
+    /// Circles and helices are taken.
+    pub fn arcs(self) -> bool {
+        matches!(self, Self::Arcs | Self::All)
+    }
+
+    /// Rapids are taken.
+    pub fn rapids(self) -> bool {
+        matches!(self, Self::Rapids | Self::All)
+    }
+}
+
 /// `[smoothing]`, models/local-smoothing.md.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothingSettings {
@@ -227,6 +252,8 @@ pub struct SmoothingSettings {
     pub transition_tolerance_mm: f64,
     /// Between rapids without STOLF (MD20560).
     pub rapid_tolerance_ratio: f64,
+    /// Blocks that the compressor takes (MD20482).
+    pub compressor_blocks: CompressorBlocks,
     /// Longest block for the compressor (MD20170).
     pub compressor_length_max_mm: f64,
     /// Turning angle that the compressor leaves as a corner (SD42470).

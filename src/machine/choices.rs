@@ -4,8 +4,8 @@
 //! is `later`.
 
 use super::checked::{
-    AccelerationMode, ArcLimits, BlendLaw, BlendLimits, BlendShape, CornerRule, CurvatureJump, FineInterpolation,
-    PathMode, TimeLawKind,
+    AccelerationMode, ArcLimits, BlendLaw, BlendLimits, BlendShape, CompressorBlocks, CornerRule, CurvatureJump,
+    FineInterpolation, PathMode, TimeLawKind,
 };
 use crate::base::AxisKind;
 
@@ -73,6 +73,11 @@ impl Choice for BlendShape {
 
 impl Choice for BlendLimits {
     const WORDS: &'static [(&'static str, Self)] = &[("axis", Self::Axis), ("path", Self::Path)];
+}
+
+impl Choice for CompressorBlocks {
+    const WORDS: &'static [(&'static str, Self)] =
+        &[("lines", Self::Lines), ("arcs", Self::Arcs), ("rapids", Self::Rapids), ("all", Self::All)];
 }
 
 impl Choice for AxisKind {

@@ -47,6 +47,7 @@ pub(super) fn smoothing(root: &Section<'_>) -> SmoothingSettings {
         orientation_tolerance_rad: rad_from_deg(smoothing.number("orientation_tolerance_deg")),
         transition_tolerance_mm: smoothing.number("transition_tolerance_mm"),
         rapid_tolerance_ratio: smoothing.number("rapid_tolerance_ratio"),
+        compressor_blocks: smoothing.choice("compressor_blocks"),
         compressor_length_max_mm: smoothing.number("compressor_length_max_mm"),
         compressor_corner_rad: rad_from_deg(smoothing.number("compressor_corner_deg")),
     }

@@ -15,13 +15,14 @@
 //! With `shape = "quintic"` the blend of G641, G642 and G645 between lines is one without a step of curvature, and rotary axes go along
 //! with it; `models/local-smoothing.md` section 1 has the published one. Where an arc or another curve takes part (with the published
 //! shape also a rotary axis), a polynomial takes its place; rotary axes keep OTOL. G643 has one range for all axes there. A blend never takes more than half of a block. Between two rapids G642, G643 and
-//! G645 have their tolerances times STOLF; next to one rapid they do not.
+//! G645 have their tolerances times STOLF; next to one rapid they do not. Where the compressor has moved a block, a blend has what is left
+//! of the tolerance.
 //!
 //! Does not cut the blocks: that is the smoother's.
 
 use super::Corner;
 use super::dynamics::Dynamics;
-use super::transition::{Pair, Tolerances, Transition, common, enough, per_axis};
+use super::transition::{Pair, Tolerances, common, enough, per_axis};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Curve, CurveState, DISPLACEMENT_MIN_LU, HermiteBlend, Line, QuinticShape};
 use crate::interpreter::{Feed, Modes};
@@ -48,10 +49,17 @@ const CURVATURE_STEP_MIN_PER_MM: f64 = 1e-6;
 /// The same as share of the greater curvature: rounding of a fitted curve.
 const CURVATURE_STEP_MIN_RATIO: f64 = 1e-6;
 
+/// Places at which what the compressor moved is looked at, over the part of a block that a blend may take; and what is kept for
+/// what they miss between them.
+const MOVED_SAMPLES: usize = 8;
+const MOVED_RESERVE_RATIO: f64 = 1.05;
+
 /// One of the two blocks at a junction.
 pub(super) struct Side<'a> {
-    /// The whole block as programmed.
+    /// The whole block.
     pub curve: &'a Curve,
+    /// What the program says, where the compressor made the curve of it.
+    pub programmed: Option<&'a Curve>,
     /// Taken from its start already.
     pub head_lu: f64,
     pub feed: &'a Feed,
@@ -108,19 +116,33 @@ impl Rules {
         let angle_rad = turning_angle(&u.first, &v.first);
         let half_lu = 0.5 * before.curve.length_lu().min(after.curve.length_lu());
         let room = Room { half_lu, free_lu };
+        let mut joint = Joint { before, after, ends: [&u, &v], angle_rad, room, left_share: 1.0 };
         // A NaN is no corner.
         let turns = angle_rad >= CORNER_ANGLE_MIN_RAD;
-        if !turns {
-            let lines = matches!((before.curve, after.curve), (Curve::Line(_), Curve::Line(_)));
-            let apart = before.curve.end() != after.curve.start();
-            if mode != PathMode::G645 || lines || apart || !steps(&u, &v) {
-                return Junction::Pass;
-            }
-            let tolerances = self.tolerances(self.settings.transition_tolerance_mm, before.modes, 1.0);
-            return self.polynomial(before, after, angle_rad, &room, &tolerances).unwrap_or(Junction::Pass);
+        if !turns && mode != PathMode::G645 {
+            return Junction::Pass;
         }
+        joint.left_share = 1.0 - self.moved_share(before, half_lu, true).max(self.moved_share(after, half_lu, false));
+        if turns { self.corner(&joint) } else { self.tangential(&joint) }
+    }
+
+    /// G645 where the direction goes on.
+    fn tangential(&self, joint: &Joint<'_>) -> Junction {
+        let (before, after, [u, v]) = (joint.before, joint.after, joint.ends);
+        let lines = matches!((before.curve, after.curve), (Curve::Line(_), Curve::Line(_)));
+        let apart = before.curve.end() != after.curve.start();
+        if lines || apart || !steps(u, v) {
+            return Junction::Pass;
+        }
+        let contour_mm = self.settings.transition_tolerance_mm * joint.left_share;
+        let tolerances = self.tolerances(contour_mm, before.modes, joint.left_share);
+        self.polynomial(joint, &joint.room, &tolerances).unwrap_or(Junction::Pass)
+    }
+
+    fn corner(&self, joint: &Joint<'_>) -> Junction {
+        let (before, after, [u, v]) = (joint.before, joint.after, joint.ends);
         // A tolerance or distance of 0 is G64.
-        let wanted = self.wanted_lu(before, after, &u.first, &v.first) > 0.0;
+        let wanted = self.wanted_lu(joint, &u.first, &v.first) > 0.0;
         if !wanted {
             return Junction::Pass;
         }
@@ -134,161 +156,133 @@ impl Rules {
         let linear_only = lines.filter(|lines| !lines.iter().any(|line| self.moves_rotary(line)));
         // An axis that POSA has sent elsewhere is on its way: no polynomial can follow it.
         let apart = before.curve.end() != after.curve.start();
-        let joined = match (mode, lines, linear_only) {
+        let joined = match (before.modes.path_mode, lines, linear_only) {
             (PathMode::G643 | PathMode::G644, ..) | (_, _, None) if apart => Some(Junction::Pass),
-            (PathMode::G643, Some(lines), _) => self.block_internal(lines, before, after, angle_rad, &room),
-            (_, Some(lines), _) if self.settings.shape == BlendShape::Quintic && self.has_corner(&u, &v) => {
-                self.quintic(lines, before, after, angle_rad, &room)
+            (PathMode::G643, Some(lines), _) => self.block_internal(lines, joint),
+            (_, Some(lines), _) if self.settings.shape == BlendShape::Quintic && self.has_corner(u, v) => {
+                self.quintic(lines, joint)
             }
-            (PathMode::G644, ..) => self.dynamic(before, after, angle_rad, &room, [&u, &v]),
-            (_, _, Some(lines)) => Some(self.published(lines, before, after, angle_rad, &room)),
-            _ => self.general(before, after, angle_rad, &room, [&u.first, &v.first]),
+            (PathMode::G644, ..) => self.dynamic(joint),
+            (_, _, Some(lines)) => Some(self.published(lines, joint)),
+            _ => self.general(joint),
         };
         joined.unwrap_or(Junction::Unrounded)
     }
 
+    /// Share of the tolerances that the compressor has used within `reach_lu` of an end of a block.
+    fn moved_share(&self, side: &Side<'_>, reach_lu: f64, at_end: bool) -> f64 {
+        let Some(programmed) = side.programmed else { return 0.0 };
+        let tolerances = self.own_tolerances(side.modes, side.feed);
+        let (length_lu, programmed_lu) = (side.curve.length_lu(), programmed.length_lu());
+        let shares = (0..=MOVED_SAMPLES).map(|i| {
+            let inside_ratio = reach_lu / length_lu * i as f64 / MOVED_SAMPLES as f64;
+            let ratio = if at_end { 1.0 - inside_ratio } else { inside_ratio };
+            let [moved, asked] = [side.curve.at(ratio * length_lu), programmed.at(ratio * programmed_lu)];
+            tolerances.share(&(moved.position.0 - asked.position.0), &self.linear)
+        });
+        (shares.fold(0.0, f64::max) * MOVED_RESERVE_RATIO).min(1.0)
+    }
+
     /// The published blend.
-    fn published(
-        &self,
-        lines: [&Line; 2],
-        before: &Side<'_>,
-        after: &Side<'_>,
-        angle_rad: f64,
-        room: &Room,
-    ) -> Junction {
+    fn published(&self, lines: [&Line; 2], joint: &Joint<'_>) -> Junction {
         let [u, v] = lines.map(|line| line.direction().masked(&self.linear));
         let alpha = self.settings.alpha_ratio;
-        let t = room.clamped(self.wanted_lu(before, after, &u, &v));
+        let t = joint.room.clamped(self.wanted_lu(joint, &u, &v));
         let Some(blend) = HermiteBlend::new(lines[0].end(), &u, &v, t, alpha) else { return Junction::Pass };
         // Of the clamped T, so that the tolerance only gets smaller.
-        let tolerance_mm = 0.25 * t * (4.0 - alpha) * (angle_rad / 2.0).sin();
-        Junction::Blend(Curve::Blend(blend), Corner { angle_rad, tolerance_mm, transition_length_mm: t })
+        let tolerance_mm = 0.25 * t * (4.0 - alpha) * (joint.angle_rad / 2.0).sin();
+        joint.blended(Curve::Blend(blend), tolerance_mm, t)
     }
 
     /// The blend without a step of curvature, rotary axes along.
-    fn quintic(
-        &self,
-        lines: [&Line; 2],
-        before: &Side<'_>,
-        after: &Side<'_>,
-        angle_rad: f64,
-        room: &Room,
-    ) -> Option<Junction> {
+    fn quintic(&self, lines: [&Line; 2], joint: &Joint<'_>) -> Option<Junction> {
         let [u, v] = lines.map(Line::direction);
         let shape = QuinticShape::new(u, v, &self.linear)?;
         let within = |tolerances: &Tolerances| {
             1.0 / tolerances.share(&(*shape.inward() * shape.deviation_ratio()), &self.linear)
         };
-        let wanted_lu = match before.modes.path_mode {
-            PathMode::G641 => self.rounding_distance_mm(before, after),
+        let wanted_lu = match joint.before.modes.path_mode {
+            PathMode::G641 => self.rounding_distance_mm(joint),
             PathMode::G644 => {
                 let [second, third] = shape.greatest_bends();
-                let dynamics = Dynamics::new(&self.machine, before, after, lines.map(|line| line.at(0.0)).each_ref());
-                dynamics.needed_lu(&second, &third).min(within(&self.machine_tolerances()))
+                let ends = lines.map(|line| line.at(0.0));
+                let dynamics = Dynamics::new(&self.machine, joint.before, joint.after, ends.each_ref());
+                dynamics.needed_lu(&second, &third).min(within(&self.machine_tolerances(joint)))
             }
-            _ => within(&self.contour_tolerances(before, after, [u, v])),
+            _ => within(&self.contour_tolerances(joint, [u, v])),
         };
-        let t = room.clamped(wanted_lu);
+        let t = joint.room.clamped(wanted_lu);
         let blend = shape.blend(lines[0].end(), t)?;
         // Of the clamped T, so that the tolerance only gets smaller.
-        let tolerance_mm = t * shape.deviation_ratio();
-        Some(Junction::Blend(Curve::Quintic(blend), Corner { angle_rad, tolerance_mm, transition_length_mm: t }))
+        Some(joint.blended(Curve::Quintic(blend), t * shape.deviation_ratio(), t))
     }
 
     /// G644: as far as the axes need, as their tolerances allow.
-    fn dynamic(
-        &self,
-        before: &Side<'_>,
-        after: &Side<'_>,
-        angle_rad: f64,
-        room: &Room,
-        ends: [&CurveState; 2],
-    ) -> Option<Junction> {
-        let dynamics = Dynamics::new(&self.machine, before, after, ends);
-        let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
-        let room = room.up_to(enough(&pair, room.clamped(f64::INFINITY), &dynamics));
-        self.polynomial(before, after, angle_rad, &room, &self.machine_tolerances())
+    fn dynamic(&self, joint: &Joint<'_>) -> Option<Junction> {
+        let dynamics = Dynamics::new(&self.machine, joint.before, joint.after, joint.ends);
+        let pair = Pair { before: joint.before.curve, after: joint.after.curve, linear: &self.linear };
+        let room = joint.room.up_to(enough(&pair, joint.room.clamped(f64::INFINITY), &dynamics));
+        self.polynomial(joint, &room, &self.machine_tolerances(joint))
     }
 
     /// G643 between lines.
-    fn block_internal(
-        &self,
-        lines: [&Line; 2],
-        before: &Side<'_>,
-        after: &Side<'_>,
-        angle_rad: f64,
-        room: &Room,
-    ) -> Option<Junction> {
-        let tolerances = self.axis_tolerances(before, after);
-        let t_max_lu = room.clamped(f64::INFINITY);
-        let blend = per_axis(lines, t_max_lu, &tolerances, &self.linear, |t| cuts(before, after, t, room.free_lu))?;
-        Some(blended(blend, angle_rad))
+    fn block_internal(&self, lines: [&Line; 2], joint: &Joint<'_>) -> Option<Junction> {
+        let tolerances = self.axis_tolerances(joint);
+        let t_max_lu = joint.room.clamped(f64::INFINITY);
+        let blend = per_axis(lines, t_max_lu, &tolerances, &self.linear, |t| joint.cuts(t))?;
+        Some(joint.blended(blend.curve, blend.deviation_mm, blend.length_lu))
     }
 
     /// G641, G642, G643 and G645 where an arc, another curve or a rotary axis takes part.
-    fn general(
-        &self,
-        before: &Side<'_>,
-        after: &Side<'_>,
-        angle_rad: f64,
-        room: &Room,
-        [u, v]: [&AxisVector; 2],
-    ) -> Option<Junction> {
+    fn general(&self, joint: &Joint<'_>) -> Option<Junction> {
         let none = Tolerances { contour_mm: f64::INFINITY, axis_lu: PerAxis::splat(f64::INFINITY) };
-        match before.modes.path_mode {
+        match joint.before.modes.path_mode {
             PathMode::G641 => {
-                let distance = room.up_to(self.rounding_distance_mm(before, after));
-                self.polynomial(before, after, angle_rad, &distance, &none)
+                let distance = joint.room.up_to(self.rounding_distance_mm(joint));
+                self.polynomial(joint, &distance, &none)
             }
             PathMode::G643 => {
-                let tolerances = Tolerances { axis_lu: self.axis_tolerances(before, after), ..none };
-                self.polynomial(before, after, angle_rad, room, &tolerances)
+                let tolerances = Tolerances { axis_lu: self.axis_tolerances(joint), ..none };
+                self.polynomial(joint, &joint.room, &tolerances)
             }
             _ => {
-                let tolerances = self.contour_tolerances(before, after, [u, v]);
-                self.polynomial(before, after, angle_rad, room, &tolerances)
+                let tolerances = self.contour_tolerances(joint, joint.ends.map(|state| &state.first));
+                self.polynomial(joint, &joint.room, &tolerances)
             }
         }
     }
 
-    fn polynomial(
-        &self,
-        before: &Side<'_>,
-        after: &Side<'_>,
-        angle_rad: f64,
-        room: &Room,
-        tolerances: &Tolerances,
-    ) -> Option<Junction> {
-        let pair = Pair { before: before.curve, after: after.curve, linear: &self.linear };
-        let t_max_lu = room.clamped(f64::INFINITY);
-        let blend = common(&pair, t_max_lu, tolerances, |t| cuts(before, after, t, room.free_lu))?;
-        let (u, v) = (before.curve.at(f64::INFINITY), after.curve.at(0.0));
+    fn polynomial(&self, joint: &Joint<'_>, room: &Room, tolerances: &Tolerances) -> Option<Junction> {
+        let pair = Pair { before: joint.before.curve, after: joint.after.curve, linear: &self.linear };
+        let blend = common(&pair, room.clamped(f64::INFINITY), tolerances, |t| joint.cuts(t))?;
+        let [u, v] = joint.ends;
         let [along, onward] = [u.first, v.first].map(|direction| direction.masked(&self.linear));
         // The tip almost turns back: what rotary axes have to do on the way is pressed into almost no length.
         let carries = u.first != along || v.first != onward;
         let sharp = carries && (turning_angle(&along, &onward) / 2.0).cos() < SHARP_COS_MAX;
-        if sharp && Dynamics::new(&self.machine, before, after, [&u, &v]).stop_is_quicker(&blend.curve) {
+        if sharp && Dynamics::new(&self.machine, joint.before, joint.after, joint.ends).stop_is_quicker(&blend.curve) {
             return Some(Junction::Stop);
         }
-        Some(blended(blend, angle_rad))
+        Some(joint.blended(blend.curve, blend.deviation_mm, blend.length_lu))
     }
 
     /// T of the published blend before it is cut to the room that there is; 0 where nothing is to be rounded.
-    fn wanted_lu(&self, before: &Side<'_>, after: &Side<'_>, u: &AxisVector, v: &AxisVector) -> f64 {
-        match before.modes.path_mode {
-            PathMode::G641 => self.rounding_distance_mm(before, after),
-            PathMode::G643 if self.contour_tolerance_mm(before, after) > 0.0 => f64::INFINITY,
+    fn wanted_lu(&self, joint: &Joint<'_>, u: &AxisVector, v: &AxisVector) -> f64 {
+        let modes = joint.before.modes;
+        match modes.path_mode {
+            PathMode::G641 => self.rounding_distance_mm(joint),
+            PathMode::G643 if self.contour_tolerance_mm(joint) > 0.0 => f64::INFINITY,
             PathMode::G643 => 0.0,
             PathMode::G644 => f64::INFINITY,
             _ => {
                 let [u, v] = [u.masked(&self.linear), v.masked(&self.linear)];
-                let epsilon = self.beta(&u, &v) * self.contour_tolerance_mm(before, after);
+                let epsilon = self.beta(&u, &v).min(joint.left_share) * self.contour_tolerance_mm(joint);
                 // |V - U| = 2 sin(theta/2); a straight joint gives an infinite T, and is no corner.
                 let shape = 4.0 - self.settings.alpha_ratio;
                 let t = 8.0 * epsilon / (shape * (v - u).norm());
-                let Some(limits) = &before.modes.programmed else { return t };
+                let Some(limits) = &modes.programmed else { return t };
                 // ATOL of an axis: its share of the deviation in the middle.
-                let factor = self.rapid_factor(before, after);
+                let factor = self.rapid_factor(joint) * joint.left_share;
                 let turns = (v - u).map(f64::abs);
                 let alone = limits.axis_tolerance_lu.as_slice().iter().zip(turns.as_slice());
                 alone.fold(t, |t, (tolerance, turn)| match tolerance {
@@ -308,22 +302,24 @@ impl Rules {
     }
 
     /// Those of G642: beta times CTOL, with ATOL of every axis and OTOL of the rotary ones.
-    fn contour_tolerances(&self, before: &Side<'_>, after: &Side<'_>, [u, v]: [&AxisVector; 2]) -> Tolerances {
-        let contour_mm = self.beta(u, v) * self.contour_tolerance_mm(before, after);
-        self.tolerances(contour_mm, before.modes, self.rapid_factor(before, after))
+    fn contour_tolerances(&self, joint: &Joint<'_>, [u, v]: [&AxisVector; 2]) -> Tolerances {
+        let contour_mm = self.beta(u, v).min(joint.left_share) * self.contour_tolerance_mm(joint);
+        self.tolerances(contour_mm, joint.before.modes, self.rapid_factor(joint) * joint.left_share)
     }
 
-    fn contour_tolerance_mm(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
-        let own = before.modes.contour_tolerance_mm.unwrap_or(self.settings.contour_tolerance_mm);
-        own * self.rapid_factor(before, after)
+    fn contour_tolerance_mm(&self, joint: &Joint<'_>) -> f64 {
+        let own = joint.before.modes.contour_tolerance_mm.unwrap_or(self.settings.contour_tolerance_mm);
+        own * self.rapid_factor(joint)
     }
 
     /// STOLF between two rapids.
-    fn rapid_factor(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
-        if !(*before.feed == Feed::Rapid && *after.feed == Feed::Rapid) {
-            return 1.0;
-        }
-        let programmed = before.modes.programmed.as_ref().and_then(|limits| limits.rapid_tolerance_ratio);
+    fn rapid_factor(&self, joint: &Joint<'_>) -> f64 {
+        let rapids = *joint.before.feed == Feed::Rapid && *joint.after.feed == Feed::Rapid;
+        if rapids { self.rapid_tolerance_ratio(joint.before.modes) } else { 1.0 }
+    }
+
+    fn rapid_tolerance_ratio(&self, modes: &Modes) -> f64 {
+        let programmed = modes.programmed.as_ref().and_then(|limits| limits.rapid_tolerance_ratio);
         programmed.unwrap_or(self.settings.rapid_tolerance_ratio)
     }
 
@@ -340,41 +336,39 @@ impl Rules {
         Tolerances { contour_mm, axis_lu }
     }
 
-    /// Tolerances of the compressor.
-    pub(super) fn own_tolerances(&self, modes: &Modes) -> Tolerances {
+    /// Tolerances of the compressor; of rapids times STOLF.
+    pub(super) fn own_tolerances(&self, modes: &Modes, feed: &Feed) -> Tolerances {
+        let factor = if *feed == Feed::Rapid { self.rapid_tolerance_ratio(modes) } else { 1.0 };
         let contour_mm = modes.contour_tolerance_mm.unwrap_or(self.settings.contour_tolerance_mm);
-        self.tolerances(contour_mm, modes, 1.0)
+        self.tolerances(contour_mm * factor, modes, factor)
     }
 
-    /// MD20170.
-    pub(super) fn compressor_length_max_mm(&self) -> f64 {
-        self.settings.compressor_length_max_mm
-    }
-
-    /// SD42470.
-    pub(super) fn compressor_corner_rad(&self) -> f64 {
-        self.settings.compressor_corner_rad
+    pub(super) fn settings(&self) -> &SmoothingSettings {
+        &self.settings
     }
 
     /// Of every axis alone: ATOL, else CTOL or OTOL.
-    fn axis_tolerances(&self, before: &Side<'_>, after: &Side<'_>) -> PerAxis<f64> {
-        let contour_mm = self.contour_tolerance_mm(before, after);
+    fn axis_tolerances(&self, joint: &Joint<'_>) -> PerAxis<f64> {
+        let contour_mm = self.contour_tolerance_mm(joint) * joint.left_share;
         let own = |tolerance_lu: f64| if tolerance_lu.is_finite() { tolerance_lu } else { contour_mm };
-        self.tolerances(contour_mm, before.modes, self.rapid_factor(before, after)).axis_lu.map(own)
+        let factor = self.rapid_factor(joint) * joint.left_share;
+        self.tolerances(contour_mm, joint.before.modes, factor).axis_lu.map(own)
     }
 
     /// Those of the machine, of every axis alone.
-    fn machine_tolerances(&self) -> Tolerances {
+    fn machine_tolerances(&self, joint: &Joint<'_>) -> Tolerances {
         let settings = &self.settings;
         let own = |linear: bool| {
-            if linear { settings.contour_tolerance_mm } else { settings.orientation_tolerance_rad }
+            let own_lu = if linear { settings.contour_tolerance_mm } else { settings.orientation_tolerance_rad };
+            own_lu * joint.left_share
         };
         Tolerances { contour_mm: f64::INFINITY, axis_lu: self.linear.map(own) }
     }
 
     /// ADISPOS between two rapids, else ADIS. A block's modes carry the one that is its own: next to one rapid, ADIS stands in
     /// the other block.
-    fn rounding_distance_mm(&self, before: &Side<'_>, after: &Side<'_>) -> f64 {
+    fn rounding_distance_mm(&self, joint: &Joint<'_>) -> f64 {
+        let (before, after) = (joint.before, joint.after);
         let modes = if *before.feed == Feed::Rapid && *after.feed != Feed::Rapid { after.modes } else { before.modes };
         modes.rounding_distance_mm.or(self.settings.rounding_distance_mm).unwrap_or(0.0)
     }
@@ -418,31 +412,45 @@ impl Room {
     }
 }
 
-/// Where the blocks are cut, to the last bit of the parts that are left.
-fn cuts(before: &Side<'_>, after: &Side<'_>, t_lu: f64, free_lu: f64) -> [PartPoint; 2] {
-    let length_lu = before.curve.length_lu();
-    let start = match before.curve {
-        // The blends take the whole block: this one begins where the last one ended.
-        curve if free_lu - t_lu <= 0.0 => {
-            if let Curve::Line(line) = curve {
-                line.shortened(before.head_lu, 0.0).start()
-            } else {
-                curve.trimmed(before.head_lu, length_lu).start()
-            }
-        }
-        Curve::Line(line) => line.shortened(0.0, t_lu).end(),
-        curve => curve.trimmed(0.0, length_lu - t_lu).end(),
-    };
-    let end = match after.curve {
-        Curve::Line(line) => line.shortened(t_lu, 0.0).start(),
-        curve => curve.trimmed(t_lu, curve.length_lu()).start(),
-    };
-    [start, end]
+/// A place where two blocks meet.
+struct Joint<'a> {
+    before: &'a Side<'a>,
+    after: &'a Side<'a>,
+    /// The end of the first block, the start of the second one.
+    ends: [&'a CurveState; 2],
+    /// The path turns by so much.
+    angle_rad: f64,
+    room: Room,
+    /// Share of the tolerances that the compressor has left.
+    left_share: f64,
 }
 
-fn blended(blend: Transition, angle_rad: f64) -> Junction {
-    let Transition { curve, length_lu, deviation_mm } = blend;
-    Junction::Blend(curve, Corner { angle_rad, tolerance_mm: deviation_mm, transition_length_mm: length_lu })
+impl Joint<'_> {
+    fn blended(&self, curve: Curve, tolerance_mm: f64, transition_length_mm: f64) -> Junction {
+        Junction::Blend(curve, Corner { angle_rad: self.angle_rad, tolerance_mm, transition_length_mm })
+    }
+
+    /// Where the blocks are cut, to the last bit of the parts that are left.
+    fn cuts(&self, t_lu: f64) -> [PartPoint; 2] {
+        let length_lu = self.before.curve.length_lu();
+        let start = match self.before.curve {
+            // The blends take the whole block: this one begins where the last one ended.
+            curve if self.room.free_lu - t_lu <= 0.0 => {
+                if let Curve::Line(line) = curve {
+                    line.shortened(self.before.head_lu, 0.0).start()
+                } else {
+                    curve.trimmed(self.before.head_lu, length_lu).start()
+                }
+            }
+            Curve::Line(line) => line.shortened(0.0, t_lu).end(),
+            curve => curve.trimmed(0.0, length_lu - t_lu).end(),
+        };
+        let end = match self.after.curve {
+            Curve::Line(line) => line.shortened(t_lu, 0.0).start(),
+            curve => curve.trimmed(t_lu, curve.length_lu()).start(),
+        };
+        [start, end]
+    }
 }
 
 /// Angle between two directions of any length: 2 atan2(|V - U|, |V + U|), exact near 0 and near 180 deg.

@@ -48,6 +48,8 @@ pub struct Smoother {
 #[derive(Clone, Debug)]
 pub(super) struct Held {
     pub curve: Curve,
+    /// What the program says, where the compressor made the curve of it.
+    pub programmed: Option<Box<Curve>>,
     /// Taken from its start by a blend.
     pub head_lu: f64,
     pub head: Head,
@@ -214,7 +216,7 @@ impl Smoother {
         }
         self.position = next.end;
         let corner = next.corner.take();
-        let mut held = Held { curve, head_lu: 0.0, head: self.head(next, 1) };
+        let mut held = Held { curve, programmed: None, head_lu: 0.0, head: self.head(next, 1) };
         if let Some(waiting) = self.waiting.take()
             && !self.fill_corner(waiting, &mut held, corner.is_some(), out)
         {
@@ -274,7 +276,7 @@ impl Smoother {
             before.curve = before.curve.trimmed(0.0, left_lu);
             self.compress(before, out);
         }
-        self.compress(Held { curve, head_lu: 0.0, head }, out);
+        self.compress(Held { curve, programmed: None, head_lu: 0.0, head }, out);
         let remains = after.curve.length_lu() - head_lu >= DISPLACEMENT_MIN_LU;
         if remains {
             after.curve = after.curve.trimmed(head_lu, f64::INFINITY);
@@ -401,7 +403,8 @@ impl Smoother {
 
 impl Held {
     fn side(&self) -> Side<'_> {
-        Side { curve: &self.curve, head_lu: self.head_lu, feed: &self.head.feed, modes: &self.head.modes }
+        let Self { curve, programmed, head_lu, head } = self;
+        Side { curve, programmed: programmed.as_deref(), head_lu: *head_lu, feed: &head.feed, modes: &head.modes }
     }
 
     /// The block up to its programmed end.

@@ -22,13 +22,15 @@
 //! |D2(k) + D2(k+1)| <= 2 A + h / t_s,    |D3(k) + D3(k+1) + D3(k+2)| <= 3 J + h / t_s
 //! ```
 //!
+//! Under BRISK and DRIVE the jerk is not judged; under DRIVE, above the velocity of MD35220, the acceleration is judged by what MD35230 leaves.
+//!
 //! The rules that bound h: at a corner that is left (G64) the axis velocity steps by at most `corner_rule` allows; where only the
 //! curvature steps the axis acceleration steps by at most J t_s, J the jerk of transitions where it is given.
 
-use crate::run::{BORDER_LU, Posture, Run};
+use crate::run::{BORDER_LU, Posture, Run, Target};
 use crate::settings::Law;
 use crate::verdict::{Finding, Kind};
-use sollwert::machine::Machine;
+use sollwert::machine::{AccelerationMode, Machine};
 
 /// Relative tolerance of a limit: rounding.
 const RATIO: f64 = 1e-6;
@@ -45,6 +47,10 @@ struct Steps {
     velocity: Posture,
     acceleration: Posture,
     corner: bool,
+    /// The jerk is not limited somewhere on the way.
+    brisk: bool,
+    /// All of the way is under DRIVE.
+    drive: bool,
 }
 
 /// The limits of one axis.
@@ -57,6 +63,8 @@ struct Limits {
     transition: f64,
     /// What a corner may step by.
     corner: f64,
+    /// DRIVE: above this velocity this acceleration.
+    reduced: [f64; 2],
 }
 
 pub fn check(machine: &Machine, law: Law, run: &Run, places: &[(usize, f64)]) -> Vec<Finding> {
@@ -69,6 +77,10 @@ pub fn check(machine: &Machine, law: Law, run: &Run, places: &[(usize, f64)]) ->
             jerk: axis.limits.jerk_max_lu_s3,
             transition: axis.limits.transition_jerk_max_lu_s3,
             corner: (8.0 * axis.limits.acceleration_max_lu_s2 * axis.follow_up_tolerance_lu).sqrt(),
+            reduced: [
+                axis.acceleration_reduction.velocity_ratio * axis.limits.velocity_max_lu_s,
+                (1.0 - axis.acceleration_reduction.reduction_ratio) * axis.limits.acceleration_max_lu_s2,
+            ],
         })
         .collect();
     let share = machine.smoothing.radial_acceleration_share;
@@ -99,7 +111,12 @@ impl Judge<'_> {
             to += 1;
         }
         let joints = self.run.joints.get(from..to.min(self.run.joints.len())).unwrap_or(&[]);
-        let mut steps = Steps::default();
+        let targets = self.run.targets_of(&rows[k - 1], &rows[k]);
+        let mut steps = Steps {
+            brisk: targets.iter().any(Target::brisk),
+            drive: targets.iter().all(|target| target.modes.acceleration_mode == AccelerationMode::Drive),
+            ..Steps::default()
+        };
         let most = self.limits.iter().map(|limits| limits.acceleration).fold(0.0, f64::max);
         for joint in joints.iter().filter(|joint| !joint.rests) {
             let turn = joint.turn.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -127,7 +144,7 @@ impl Judge<'_> {
 
     fn axis(&self, i: usize, name: &str, steps: &[Steps]) -> Vec<Finding> {
         let (rows, t) = (&self.run.rows, self.run.t_s);
-        let Limits { velocity, acceleration, jerk, transition, .. } = self.limits[i];
+        let Limits { velocity, acceleration, jerk, transition, reduced, .. } = self.limits[i];
         // The jerk of transitions is a limit of its own: inside blends it holds, wherever it is the lower one it is not checked here.
         let jerk = jerk.max(transition);
         let largest = rows.iter().map(|row| row.q[i].abs()).fold(0.0, f64::max);
@@ -144,16 +161,20 @@ impl Judge<'_> {
             worst.note(Kind::Velocity, k, (q(k + 1) - q(k)) / t, velocity * (1.0 + RATIO) + noise(1));
         }
         for k in 1..last.saturating_sub(1) {
-            let allowed = acceleration * (1.0 + RATIO) + noise(2);
+            // A piece goes faster than that with the lower acceleration all along; the neighbours say that no piece begins here.
+            let fast = |n: usize| n + 1 < last && steps[n].drive && (q(n + 1) - q(n)).abs() > reduced[0] * t;
+            let lower = k > 1 && (k - 2..k + 2).all(fast);
+            let allowed = if lower { reduced[1] } else { acceleration } * (1.0 + RATIO) + noise(2);
             worst.note(Kind::Acceleration, k, d2(k), allowed + (v(k - 1) + v(k)) / t);
             if k + 2 < last {
                 let seen = v(k - 1) + v(k) + v(k + 1);
+                let allowed = acceleration * (1.0 + RATIO) + noise(2);
                 worst.note(Kind::VelocityStep, k, d2(k) + d2(k + 1), 2.0 * allowed + seen / t);
             }
         }
         for k in 1..last.saturating_sub(2) {
             let (corner, dv, da) = (
-                (k - 1..k + 2).any(|n| steps[n].corner),
+                (k - 1..k + 2).any(|n| steps[n].corner || steps[n].brisk),
                 (k - 1..k + 2).map(v).sum::<f64>(),
                 (k - 1..k + 2).map(a).sum::<f64>(),
             );
@@ -162,7 +183,7 @@ impl Judge<'_> {
             }
             let allowed = jerk * (1.0 + RATIO) + noise(3);
             worst.note(Kind::Jerk, k, d3(k), allowed + 0.75 * da / t + dv / (t * t));
-            if k + 4 < last && !(k - 1..k + 4).any(|n| steps[n].corner) {
+            if k + 4 < last && !(k - 1..k + 4).any(|n| steps[n].corner || steps[n].brisk) {
                 let (da, dv): (f64, f64) = ((k - 1..k + 4).map(a).sum(), (k - 1..k + 4).map(v).sum());
                 let sum = d3(k) + d3(k + 1) + d3(k + 2);
                 worst.note(Kind::AccelerationStep, k, sum, 3.0 * allowed + da / t + dv / (t * t));

@@ -7,7 +7,8 @@
 //! |q - parabola| <= J t_s³ / (9 sqrt 3)  +  A_step t_s² / 16
 //! ```
 //!
-//! (Lagrange's remainder; A_step is what the acceleration steps by), so that a point can be looked for between set-points.
+//! (Lagrange's remainder; A_step is what the acceleration steps by), so that a point can be looked for between set-points. Without a limit
+//! of jerk the difference has no second derivative above 2 A: it is at most `A t_s² / 4`.
 
 use crate::run::{Posture, Run, Target, distance, posture};
 use crate::verdict::{Finding, Kind};
@@ -30,7 +31,7 @@ struct Tolerance {
 
 pub fn check(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Vec<Finding> {
     let mut findings: Vec<Finding> = points(machine, run).into_iter().collect();
-    findings.extend(feeds(machine, run));
+    findings.extend(feeds(run));
     findings.extend(rests(machine, run, places));
     findings.extend(ends(machine, run));
     findings
@@ -108,6 +109,9 @@ fn missed(machine: &Machine, run: &Run, blocks: [u64; 2], (target, tolerance): (
         .map(|axis| {
             let limits = &axis.limits;
             let jerk = limits.jerk_max_lu_s3.max(limits.transition_jerk_max_lu_s3);
+            if run.brisk() {
+                return limits.acceleration_max_lu_s2 * t * t / 4.0;
+            }
             jerk * t.powi(3) * (1.0 / (9.0 * 3_f64.sqrt()) + 1.0 / 16.0)
                 + stepped * limits.acceleration_max_lu_s2 * t * t / 16.0
         })
@@ -140,12 +144,10 @@ fn missed(machine: &Machine, run: &Run, blocks: [u64; 2], (target, tolerance): (
 }
 
 /// No faster along the path than the fastest F of the blocks that two set-points belong to.
-fn feeds(machine: &Machine, run: &Run) -> Option<Finding> {
-    let index = |block: u64| run.targets.partition_point(|target| target.block <= block).saturating_sub(1);
-    let _ = machine;
+fn feeds(run: &Run) -> Option<Finding> {
     let mut worst: Option<Finding> = None;
     for pair in run.rows.windows(2) {
-        let targets = run.targets.get(index(pair[0].block)..=index(pair[1].block)).unwrap_or(&[]);
+        let targets = run.targets_of(&pair[0], &pair[1]);
         let fastest = targets.iter().map(|target| target.feed.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
         let feed = (pair[1].s_mm - pair[0].s_mm) / run.t_s;
         let text = format!("feed in line {}", pair[1].line);
@@ -157,7 +159,7 @@ fn feeds(machine: &Machine, run: &Run) -> Option<Finding> {
     worst
 }
 
-/// Within a cycle of a rest every axis is no further from it than jerk makes of rest in that time.
+/// Within a cycle of a rest every axis is no further from it than jerk (without its limit: acceleration) makes of rest in that time.
 pub fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Finding> {
     for k in 1..run.rows.len() {
         let (from, to) = (places[k - 1].0, places[k].0);
@@ -179,7 +181,9 @@ pub fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Fi
 fn far(machine: &Machine, run: &Run, q: &Posture, point: &Posture, text: &str) -> Option<Finding> {
     machine.axes.iter().enumerate().find_map(|(i, axis)| {
         let jerk = axis.limits.jerk_max_lu_s3.max(axis.limits.transition_jerk_max_lu_s3);
-        let allowed = jerk * run.t_s.powi(3) / 6.0 * (1.0 + 1e-6) + 1e-9;
+        let soft = jerk * run.t_s.powi(3) / 6.0;
+        let moved = if run.brisk() { axis.limits.acceleration_max_lu_s2 * run.t_s.powi(2) / 2.0 } else { soft };
+        let allowed = moved * (1.0 + 1e-6) + 1e-9;
         finding(Kind::Rest, (q[i] - point[i]).abs(), allowed, format!("{text}, axis {}", axis.name))
     })
 }

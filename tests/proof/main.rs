@@ -46,9 +46,12 @@ const PRINTED_MAX: usize = 3;
 /// A machine and a program from a seed.
 fn case(seed: u64, law: Law) -> (Settings, Program, Random) {
     let mut random = Random::new(seed);
-    let settings = Settings::random(&mut random, law);
+    let mut settings = Settings::random(&mut random, law);
     let count = 4 + random.below(30) as usize;
-    let program = Program::random(&mut random, &settings, count);
+    let mut program = Program::random(&mut random, &settings, count);
+    let mut other = Random::new(!seed);
+    settings.reduce(&mut other);
+    program.accelerate(&mut other);
     (settings, program, random)
 }
 

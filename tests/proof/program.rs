@@ -97,6 +97,23 @@ impl Program {
         Self { blocks: maker.blocks }
     }
 
+    /// Some programs without a limit of jerk, all along or on the way.
+    pub fn accelerate(&mut self, random: &mut Random) {
+        let word = |word: &str| Block::Word(word.to_owned());
+        match random.below(8) {
+            0 => self.blocks.insert(0, word("BRISK")),
+            1 => self.blocks.insert(0, word("DRIVE")),
+            2 => {
+                let most = self.blocks.len() as u32;
+                let mut places = [0; 2].map(|_| random.below(most) as usize);
+                places.sort_unstable();
+                self.blocks.insert(places[1], word("SOFT"));
+                self.blocks.insert(places[0], word(["BRISK", "DRIVE"][random.below(2) as usize]));
+            }
+            _ => {}
+        }
+    }
+
     /// NC text.
     pub fn text(&self, settings: &Settings) -> String {
         self.text_from(settings, [0.0; 5], "").0

@@ -10,7 +10,7 @@ use sollwert::interpolator::Setpoint;
 use sollwert::interpreter::{Feed, Interpreter, Modes, MoveKind};
 use sollwert::kernel::{Kernel, RunSummary, Status};
 use sollwert::kinematics::{JointPath, Kinematics};
-use sollwert::machine::Machine;
+use sollwert::machine::{AccelerationMode, Machine};
 use sollwert::program::ProgramSource;
 use sollwert::smoothing::{ContourPiece, PieceKind, Smoother};
 use std::sync::Arc;
@@ -37,6 +37,13 @@ pub struct Target {
     pub end: Posture,
     pub modes: Modes,
     pub feed: Option<f64>,
+}
+
+impl Target {
+    /// Without a limit of jerk.
+    pub fn brisk(&self) -> bool {
+        self.modes.acceleration_mode != AccelerationMode::Soft
+    }
 }
 
 /// A smooth stretch of the path.
@@ -134,6 +141,17 @@ impl Run {
     /// Lengths of the blends: one that is cut short by a shorter block makes another path, also where the tip does not show it.
     pub fn blends_lu(&self) -> Vec<f64> {
         self.stretches.iter().filter(|stretch| stretch.blend).map(|stretch| stretch.length_lu).collect()
+    }
+
+    /// Programmed motions that a row, or the way between two, belongs to.
+    pub fn targets_of(&self, from: &Row, to: &Row) -> &[Target] {
+        let index = |block: u64| self.targets.partition_point(|target| target.block <= block).saturating_sub(1);
+        self.targets.get(index(from.block)..=index(to.block)).unwrap_or(&[])
+    }
+
+    /// The jerk is not limited somewhere.
+    pub fn brisk(&self) -> bool {
+        self.targets.iter().any(Target::brisk)
     }
 
     /// Places where the path rests.

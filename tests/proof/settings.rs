@@ -31,6 +31,8 @@ pub struct Axis {
     pub acceleration_max: f64,
     pub jerk_max: f64,
     pub transition_jerk_max: Option<f64>,
+    /// DRIVE: share of the velocity above which the acceleration is lower, and share of the acceleration that is taken off.
+    pub reduction: Option<[f64; 2]>,
 }
 
 /// One machine.
@@ -111,6 +113,15 @@ impl Settings {
         Self { axes, kinematics, ..Self::random(random, law) }
     }
 
+    /// Some axes have less acceleration at high speed.
+    pub fn reduce(&mut self, random: &mut Random) {
+        for axis in &mut self.axes {
+            if random.below(2) == 0 {
+                axis.reduction = Some([round(random.between(0.1, 0.9)), round(random.between(0.1, 0.9))]);
+            }
+        }
+    }
+
     /// The machine file.
     pub fn text(&self) -> String {
         let Self { law, quintic, t_cyl_ms, look_ahead_blocks, axes, kinematics } = self;
@@ -151,7 +162,7 @@ impl Axis {
         };
         let share = [None, Some(0.5), Some(1.0)][random.below(3) as usize];
         let transition_jerk_max = share.map(|share| round(share * jerk_max));
-        Self { name, velocity_max, acceleration_max, jerk_max, transition_jerk_max }
+        Self { name, velocity_max, acceleration_max, jerk_max, transition_jerk_max, reduction: None }
     }
 
     pub fn rotary(&self) -> bool {
@@ -161,7 +172,7 @@ impl Axis {
     fn write(&self, text: &mut String) {
         let [kind, v, a, j] =
             if self.rotary() { ["rotary", "rpm", "rot_s2", "rot_s3"] } else { ["linear", "m_min", "m_s2", "m_s3"] };
-        let Self { name, velocity_max, acceleration_max, jerk_max, transition_jerk_max } = self;
+        let Self { name, velocity_max, acceleration_max, jerk_max, transition_jerk_max, reduction } = self;
         let _ = write!(
             text,
             "[axes.{name}]\nkind = \"{kind}\"\nvelocity_max_{v} = {velocity_max:?}\n\
@@ -169,6 +180,12 @@ impl Axis {
         );
         if let Some(transition) = transition_jerk_max {
             let _ = writeln!(text, "transition_jerk_max_{j} = {transition:?}");
+        }
+        if let Some([velocity, acceleration]) = reduction {
+            let _ = writeln!(
+                text,
+                "acceleration_reduction_velocity_ratio = {velocity:?}\nacceleration_reduction_ratio = {acceleration:?}"
+            );
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Tests of the room `smoothing`: corners, inserts, path modes, compressor.
 
 mod compressor;
+mod compressor_kinds;
 mod five;
 mod inserts;
 mod modes;

@@ -11,15 +11,19 @@
 //! | COMPCAD | the smoothest spline of degree 5 | at the ends of the run | fourth derivative |
 //! | COMPSURF | the same, from near points alone | at the ends of the run | fourth derivative |
 //!
-//! A block goes on as it is where the compressor is off, and where it is no line with feed, before an exact stop, of rotary axes
-//! alone, or longer than `compressor_length_max_mm`. A run ends where one of these stands, where a block has something to put out,
-//! where the modes change or feed and rapid meet, at corners of `compressor_corner_deg` or more, and where blocks are so long for
+//! Lines are taken, with `compressor_blocks` also arcs and rapids. An arc becomes chords that it rises above by a tenth of the
+//! tolerance at most (`chords`).
+//!
+//! A block goes on as it is where the compressor is off, and where it is of no kind that is taken, before an exact stop, of rotary
+//! axes alone, or longer than `compressor_length_max_mm`. A run ends where one of these stands, where a block has something to put
+//! out, where the modes change or feed and rapid meet, at corners of `compressor_corner_deg` or more, and where blocks are so long for
 //! their turn that no smooth curve is in the tolerance. Corners between blocks shorter than five tolerances are noise up to a right
 //! angle: the curve passes them.
 //!
 //! Memory: one window of points, a few hundred. Does not round what corners are left: that is `corner`.
 
 mod basis;
+mod chords;
 mod nodes;
 mod spline;
 mod track;
@@ -30,6 +34,7 @@ use super::smoother::Held;
 use crate::geometry::Curve;
 use crate::interpreter::{Compressor, Feed};
 use crate::machine::PathMode;
+use chords::Chords;
 use nodes::Nodes;
 use spline::Spline;
 use std::collections::VecDeque;
@@ -56,6 +61,10 @@ pub(super) struct Compression {
 struct Run {
     track: Track,
     curve: Fit,
+    /// The last block: how it is cut depends on the next one.
+    last: Option<(Held, Chords)>,
+    /// Chord of the arc before that, if there is one.
+    arc_chord_lu: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -67,16 +76,16 @@ enum Fit {
 impl Compression {
     /// Takes a block.
     pub(super) fn push(&mut self, block: Held, rules: &Rules) {
-        if !eligible(&block, rules) {
+        let Some(chords) = eligible(&block, rules) else {
             self.flush();
             self.ready.push_back(block);
             return;
-        }
+        };
         if !self.run.as_ref().is_some_and(|run| run.goes_on(&block, rules)) {
             self.flush();
         }
         let run = self.run.get_or_insert_with(|| Run::new(&block, rules));
-        run.add(block);
+        run.add(block, chords);
         run.hand_over(false, &mut self.ready);
     }
 
@@ -93,21 +102,29 @@ impl Compression {
     /// Ends the run.
     pub(super) fn flush(&mut self) {
         let Some(mut run) = self.run.take() else { return };
-        if !run.track.begun && run.track.blocks.len() == 1 {
-            self.ready.extend(run.track.blocks);
+        if !run.track.begun && run.track.blocks.is_empty() {
+            self.ready.extend(run.last.map(|(block, _)| block));
             return;
         }
+        run.take_last(None);
         run.hand_over(true, &mut self.ready);
     }
 }
 
-/// The block may be compressed.
-fn eligible(block: &Held, rules: &Rules) -> bool {
-    let modes = &block.head.modes;
+/// How a block is cut that may be compressed.
+fn eligible(block: &Held, rules: &Rules) -> Option<Chords> {
+    let (modes, settings) = (&block.head.modes, rules.settings());
     let asked = modes.compressor != Compressor::Off && modes.path_mode != PathMode::ExactStop;
-    let short = block.curve.length_lu() <= rules.compressor_length_max_mm();
-    let kind = matches!(block.curve, Curve::Line(_)) && block.head.feed != Feed::Rapid;
-    asked && short && kind && !block.curve.rotary_only()
+    let short = block.curve.length_lu() <= settings.compressor_length_max_mm;
+    let kind = match block.curve {
+        Curve::Line(_) => block.head.feed != Feed::Rapid || settings.compressor_blocks.rapids(),
+        Curve::Arc(_) | Curve::SpatialArc(_) => settings.compressor_blocks.arcs(),
+        _ => false,
+    };
+    if !(asked && short && kind) || block.curve.rotary_only() {
+        return None;
+    }
+    Chords::new(&block.curve, &rules.own_tolerances(modes, &block.head.feed), rules.linear())
 }
 
 impl Run {
@@ -121,14 +138,17 @@ impl Run {
             Compressor::Cad => spline(spline::CAD),
             Compressor::Surface => spline(spline::SURFACE),
         };
-        Self { track: Track::new(start, rules.own_tolerances(modes), rules.linear()), curve }
+        let tolerances = rules.own_tolerances(modes, &block.head.feed);
+        Self { track: Track::new(start, tolerances, rules.linear()), curve, last: None, arc_chord_lu: None }
     }
 
     /// The block continues the curve.
     fn goes_on(&self, block: &Held, rules: &Rules) -> bool {
-        let Some(last) = self.track.blocks.back() else { return false };
+        let Some((last, _)) = &self.last else { return false };
         let before = &last.curve;
-        if !block.head.events.is_empty() || block.head.modes != last.head.modes || before.end() != block.curve.start() {
+        let rapids = [&last.head.feed, &block.head.feed].map(|feed| *feed == Feed::Rapid);
+        let same = block.head.modes == last.head.modes && rapids[0] == rapids[1];
+        if !block.head.events.is_empty() || !same || before.end() != block.curve.start() {
             return false;
         }
         let ends = [before.at(f64::INFINITY), block.curve.at(0.0)];
@@ -136,16 +156,26 @@ impl Run {
         let turn_rad = 2.0 * (v - u).norm().atan2((v + u).norm());
         let (h, k) = (before.length_lu(), block.curve.length_lu());
         let tolerance_mm = self.track.tolerances.contour_mm;
-        let corner = turn_rad >= rules.compressor_corner_rad()
+        let corner = turn_rad >= rules.settings().compressor_corner_rad
             && (h.min(k) > SHORT_TOLERANCES * tolerance_mm || turn_rad > SHARP_RAD);
         let height_mm = turn_rad * h * k / (h + k);
         !corner && height_mm <= HEIGHT_MAX_RATIO * tolerance_mm
     }
 
-    fn add(&mut self, block: Held) {
-        self.track.add(block, 1, 0.0);
+    fn add(&mut self, block: Held, chords: Chords) {
+        self.take_last(chords.arc_chord_lu);
+        self.last = Some((block, chords));
+    }
+
+    /// The last block becomes part of the curve. `next_chord_lu`: that of the arc that comes next.
+    fn take_last(&mut self, next_chord_lu: Option<f64>) {
+        let Some((block, mut chords)) = self.last.take() else { return };
+        chords.grade(block.curve.length_lu(), [self.arc_chord_lu, next_chord_lu]);
+        self.arc_chord_lu = chords.arc_chord_lu;
+        let count = self.track.add(block, &chords);
         if let Fit::Spline(spline) = &mut self.curve {
-            spline.push(&self.track);
+            let points = self.track.points.len();
+            (points - count..points).for_each(|last| spline.push(&self.track, last));
         }
     }
 

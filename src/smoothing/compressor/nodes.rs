@@ -5,7 +5,7 @@
 //! over as many points as the polynomial before spans: the longer the curves, the less of the rounding of the program is left in
 //! them. With COMPON the curves are of degree 3 and their curvature steps; with COMPCURV they are of degree 5 and it does not.
 //!
-//! Where not even one chord keeps the tolerance it stays straight. Does not move points: that is `spline`.
+//! Where not even one chord keeps the tolerance it stays as programmed. Does not move points: that is `spline`.
 
 use super::super::smoother::Held;
 use super::super::transition::hermite;
@@ -62,7 +62,7 @@ impl Nodes {
                 }
                 None => {
                     self.before = None;
-                    track.straight(1, ready);
+                    track.as_programmed(1, ready);
                     self.start = None;
                 }
             }

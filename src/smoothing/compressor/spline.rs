@@ -22,7 +22,7 @@
 //! the same rounds everywhere: the curve at a place follows from the points near it, whichever way and from wherever the path comes, so that
 //! neighbouring passes over a surface come out alike.
 //!
-//! Where nothing keeps the tolerance the blocks stay straight. Does not know blocks: that is `track`.
+//! Where nothing keeps the tolerance the blocks stay as programmed. Does not know blocks: that is `track`.
 
 use super::super::smoother::Held;
 use super::track::Track;
@@ -114,10 +114,10 @@ impl Spline {
         (self.parts, self.open, self.closed) = (parts, open, chords);
     }
 
-    /// Takes the chord that was added to the track last.
-    pub(super) fn push(&mut self, track: &Track) {
+    /// Takes the chord that ends in a point of the track.
+    pub(super) fn push(&mut self, track: &Track, last: usize) {
         self.open += 1;
-        if self.open > 1 && !self.may_be_one(track) {
+        if self.open > 1 && !self.may_be_one(track, last) {
             self.close(self.open - 1);
             self.open = 1;
         }
@@ -130,8 +130,7 @@ impl Spline {
     }
 
     /// The open chords bend so little that one span will do.
-    fn may_be_one(&self, track: &Track) -> bool {
-        let last = track.points.len() - 1;
+    fn may_be_one(&self, track: &Track, last: usize) -> bool {
         if self.open > self.style.chords_max || last < self.open {
             return false;
         }
@@ -160,7 +159,7 @@ impl Spline {
                 _ => {
                     let chords = self.parts.pop_front().map_or(1, |part| part.chords);
                     self.closed -= chords;
-                    track.straight(chords, ready);
+                    track.as_programmed(chords, ready);
                     self.restart(track);
                 }
             }

@@ -3,17 +3,18 @@
 //! In: blocks. Out: the points between which curves are fitted, the check that a polynomial stays in the tolerance, and the blocks with
 //! the stretch of their polynomial as their curve.
 //!
-//! A polynomial is compared with the programmed line at the same place along it, so that neither is further from the other than the
-//! tolerance. Between two points the difference of the two is the polynomial less its chord, which is not more than `h²/8 max |q''|`,
-//! plus what lies between the differences at the points; where that is too coarse, it is less than its greatest Bernstein coefficient.
-//! Both are bounds, not samples.
+//! A block is as many chords as `chords` says. A polynomial is compared with the chord at the same place along it, so that neither is further from
+//! the other than the tolerance. Between two points the difference of the two is the polynomial less its chord, which is not more than
+//! `h²/8 max |q''|`, plus what lies between the differences at the points; where that is too coarse, it is less than its greatest
+//! Bernstein coefficient. What an arc rises above its chord is added. All are bounds, not samples.
 //!
 //! Does not find the polynomial.
 
 use super::super::smoother::Held;
-use super::super::transition::{Tolerances, piece};
+use super::super::transition::{Tolerances, hermite, piece};
+use super::chords::Chords;
 use crate::base::{AxisVector, PartPoint, PerAxis};
-use crate::geometry::{Curve, Line, PolynomialCurve};
+use crate::geometry::{Curve, CurveState, Line, PolynomialCurve};
 use crate::interpreter::{PolynomialGeometry, PolynomialPiece};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -26,6 +27,8 @@ pub(super) struct Point {
     pub along_lu: f64,
     /// A block ends here.
     pub ends_block: bool,
+    /// From the start of its block.
+    place_lu: f64,
     /// Share of the tolerance that the chord up to here takes: 0 for a straight block.
     pub sag_share: f64,
 }
@@ -56,7 +59,7 @@ pub(super) struct Track {
 
 impl Track {
     pub(super) fn new(start: PartPoint, tolerances: Tolerances, linear: &PerAxis<bool>) -> Self {
-        let first = Point { position: start.0, along_lu: 0.0, ends_block: true, sag_share: 0.0 };
+        let first = Point { position: start.0, along_lu: 0.0, ends_block: true, place_lu: 0.0, sag_share: 0.0 };
         Self {
             tolerances,
             linear: *linear,
@@ -68,16 +71,19 @@ impl Track {
         }
     }
 
-    /// Appends a block with the points that stand for it.
-    pub(super) fn add(&mut self, block: Held, chords: usize, sag_share: f64) {
-        for i in 1..=chords {
-            let place_lu = block.curve.length_lu() * i as f64 / chords as f64;
-            let position = if i == chords { block.curve.end().0 } else { block.curve.at(place_lu).position.0 };
-            let Some(last) = self.points.back() else { return };
-            let along_lu = last.along_lu + (position - last.position).masked(&self.linear).norm();
-            self.points.push_back(Point { position, along_lu, ends_block: i == chords, sag_share });
+    /// Appends a block with the points that stand for it; how many.
+    pub(super) fn add(&mut self, block: Held, chords: &Chords) -> usize {
+        let (length_lu, sag_share) = (block.curve.length_lu(), chords.sag_share);
+        let count = chords.places_lu.len() + 1;
+        for (i, place_lu) in chords.places_lu.iter().copied().chain([length_lu]).enumerate() {
+            let ends_block = i + 1 == count;
+            let position = if ends_block { block.curve.end().0 } else { block.curve.at(place_lu).position.0 };
+            let before = self.points.back().map_or((AxisVector::zero(), 0.0), |last| (last.position, last.along_lu));
+            let along_lu = before.1 + (position - before.0).masked(&self.linear).norm();
+            self.points.push_back(Point { position, along_lu, ends_block, place_lu, sag_share });
         }
         self.blocks.push_back(block);
+        count
     }
 
     /// How many chords wait.
@@ -187,20 +193,17 @@ impl Track {
         self.hand_over(curve, ready);
     }
 
-    /// Hands over some chords as they are programmed: straight, from where the curve is.
-    pub(super) fn straight(&mut self, chords: usize, ready: &mut VecDeque<Held>) {
+    /// Hands over some chords as they are programmed, from where the curve is.
+    pub(super) fn as_programmed(&mut self, chords: usize, ready: &mut VecDeque<Held>) {
         for _ in 0..chords.min(self.chords()) {
-            let Point { position, ends_block, .. } = self.points[1];
-            let width_lu = self.points[1].along_lu - self.points[0].along_lu;
-            let from =
-                self.pieces.last().map_or(self.end.0, |piece| value(&piece.numerator_lu, piece.parameter_end_ratio));
-            if ends_block && self.pieces.is_empty() {
-                self.hand_over(Curve::Line(Line::new(self.end, PartPoint(position), &self.linear)), ready);
+            let [start, end] = [0, 1].map(|index| self.points[index]);
+            let line = self.blocks.front().is_none_or(|block| matches!(block.curve, Curve::Line(_)));
+            if line && end.ends_block && self.pieces.is_empty() {
+                self.hand_over(Curve::Line(Line::new(self.end, PartPoint(end.position), &self.linear)), ready);
             } else {
-                let mut numerator_lu = [AxisVector::zero(); 6];
-                (numerator_lu[0], numerator_lu[1]) = (from, (position - from) * (1.0 / width_lu));
-                self.pieces.push(piece(width_lu, numerator_lu));
-                if ends_block {
+                let numerator_lu = if line { self.straight(&start, &end) } else { self.bent(&start, &end) };
+                self.pieces.push(piece(end.along_lu - start.along_lu, numerator_lu));
+                if end.ends_block {
                     self.end_pieces(false, ready);
                 }
             }
@@ -208,10 +211,35 @@ impl Track {
         }
     }
 
+    /// Where the curves end.
+    fn reached(&self) -> AxisVector {
+        self.pieces.last().map_or(self.end.0, |piece| value(&piece.numerator_lu, piece.parameter_end_ratio))
+    }
+
+    fn straight(&self, start: &Point, end: &Point) -> [AxisVector; 6] {
+        let from = self.reached();
+        let mut numerator_lu = [AxisVector::zero(); 6];
+        numerator_lu[0] = from;
+        numerator_lu[1] = (end.position - from) * (1.0 / (end.along_lu - start.along_lu));
+        numerator_lu
+    }
+
+    /// A chord of an arc, with the direction and the curvature of the arc at both ends: over [`Chords`] the two are 1e-9 apart.
+    fn bent(&self, start: &Point, end: &Point) -> [AxisVector; 6] {
+        let Some(block) = self.blocks.front() else { return self.straight(start, end) };
+        let from_lu = if start.ends_block { 0.0 } else { start.place_lu };
+        let width_lu = end.along_lu - start.along_lu;
+        let ratio = (end.place_lu - from_lu) / width_lu;
+        let [first, last] = [from_lu, end.place_lu].map(|place_lu| block.curve.at(place_lu));
+        let slopes = |state: &CurveState| [state.first * ratio, state.second * (ratio * ratio)];
+        let ([m, a], [n, b]) = (slopes(&first), slopes(&last));
+        hermite(width_lu, [self.reached(), m, a], [end.position, n, b])
+    }
+
     fn hand_over(&mut self, curve: Curve, ready: &mut VecDeque<Held>) {
         let Some(mut block) = self.blocks.pop_front() else { return };
         self.end = curve.end();
-        block.curve = curve;
+        block.programmed = Some(Box::new(std::mem::replace(&mut block.curve, curve)));
         self.begun = true;
         ready.push_back(block);
     }
