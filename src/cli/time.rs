@@ -49,8 +49,11 @@ pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
     let overrides = arguments.panel.overrides()?;
     if !overrides.changes().is_empty() && (arguments.optimal || arguments.what_if) {
         return Err(Failure::unreadable(
-            Diagnostic::error("C0008", "--optimal and --what-if ask about the programmed feed: they do not go with --override")
-                .help("leave one of the two out"),
+            Diagnostic::error(
+                "C0008",
+                "--optimal and --what-if ask about the programmed feed: they do not go with --override",
+            )
+            .help("leave one of the two out"),
         ));
     }
     let machine = arguments.machine.load_to_run()?;

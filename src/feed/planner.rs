@@ -285,7 +285,8 @@ impl Planner {
         if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_)) && front.path.contour.feed != Feed::Rapid {
             self.cutting_s += law.duration_s();
         }
-        let piece = PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings, overrides };
+        let piece =
+            PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings, overrides };
         self.entry = exit;
         self.admitted -= 1;
         self.changed_from = self.changed_from.saturating_sub(1);

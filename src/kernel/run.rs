@@ -101,7 +101,8 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
 
 /// A law that begins and ends every piece without acceleration cannot change the feed inside one.
 fn override_refused() -> Diagnostic {
-    let message = "--override needs the time law `continuous`: under `seven-phase` the feed cannot change inside a block";
+    let message =
+        "--override needs the time law `continuous`: under `seven-phase` the feed cannot change inside a block";
     Diagnostic::error("K0008", message).help("leave --override out, or run with --set feed.time_law=continuous")
 }
 

@@ -58,7 +58,7 @@ pub struct OverrideSummary {
     /// As asked for; it acts from the first set-point at or after it.
     pub time_s: f64,
     /// Of the programmed feed.
-    pub percent: f64,
+    pub override_percent: f64,
 }
 
 /// One blended corner.
@@ -144,7 +144,7 @@ impl RunSummary {
     pub fn add_overrides(&mut self, schedule: &OverrideSchedule) {
         let change = |change: &OverrideChange| OverrideSummary {
             time_s: change.time_s,
-            percent: units::percent_from_ratio(change.override_ratio),
+            override_percent: units::percent_from_ratio(change.override_ratio),
         };
         self.overrides.extend(schedule.changes().iter().map(change));
     }

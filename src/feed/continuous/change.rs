@@ -274,8 +274,7 @@ impl Continuous {
         let Tangent { acceleration_lu_s2, jerk_lu_s3, jerk_limited, .. } =
             Tangent::new(&front.flow.rules, front.flow.blend, &first);
         let dynamics = Dynamics { acceleration_lu_s2, jerk_lu_s3: jerk_limited.then_some(jerk_lu_s3) };
-        let [phase_s, full_s] =
-            [a.abs(), acceleration_lu_s2].map(|a| if jerk_limited { a / jerk_lu_s3 } else { 0.0 });
+        let [phase_s, full_s] = [a.abs(), acceleration_lu_s2].map(|a| if jerk_limited { a / jerk_lu_s3 } else { 0.0 });
         // The speed that the acceleration leads to before it can be taken away.
         let led_lu_s = (v + 0.5 * a * phase_s).max(0.0);
         let way_lu = dynamics.ramp_length_lu(led_lu_s, target_lu_s) + a.signum() * v * phase_s;
@@ -314,7 +313,8 @@ impl Continuous {
             if at_lu > way_lu {
                 return None;
             }
-            let lower_lu_s = interval.cap.velocity_lu_s.min(std::mem::replace(&mut cap_lu_s, interval.cap.velocity_lu_s));
+            let lower_lu_s =
+                interval.cap.velocity_lu_s.min(std::mem::replace(&mut cap_lu_s, interval.cap.velocity_lu_s));
             let b = before.at(at_lu)?.min(lower_lu_s * lower_lu_s);
             at_lu += interval.length_lu();
             Some(FLOOR_RATIO * FLOOR_RATIO * b)
