@@ -202,7 +202,7 @@ impl Planner {
                     .as_ref()
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
                 if flows {
-                    let flow = Flow::new(rules.clone(), &path, blend);
+                    let flow = Flow::new(rules.clone(), &path, blend, [&ends.start, &ends.end]);
                     check_flow(&flow, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
                     self.last = Some((ends, rules));
                     Motion::Flows(Box::new(flow))

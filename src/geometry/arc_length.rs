@@ -16,7 +16,7 @@
 
 use super::curve::DISPLACEMENT_MIN_LU;
 use super::quadrature::integral;
-use super::rational::{derivatives, is_plain, speed};
+use super::rational::{derivatives, is_plain, speed, speeds};
 use crate::base::PerAxis;
 use crate::interpreter::{PolynomialGeometry, PolynomialPiece};
 use std::sync::Arc;
@@ -218,7 +218,7 @@ impl ArcLengthTable {
     }
 
     fn length_between(&self, piece: &PolynomialPiece, from: f64, to: f64) -> f64 {
-        integral(from, to, |u| self.speed(piece, u))
+        integral(from, to, |places| speeds(piece, &self.linear, &self.counted, places))
     }
 
     /// Length to a few digits: only a scale.

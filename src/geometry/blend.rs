@@ -277,9 +277,11 @@ impl Shape {
 
     fn length_between(&self, from_ratio: f64, to_ratio: f64) -> f64 {
         let [p0, p1, p2] = self.speed_squared();
-        0.5 * integral(from_ratio, to_ratio, |w| {
-            let ww = w * w;
-            (p0 + ww * (p1 + ww * p2)).max(0.0).sqrt()
+        0.5 * integral(from_ratio, to_ratio, |places| {
+            places.map(|w| {
+                let ww = w * w;
+                (p0 + ww * (p1 + ww * p2)).max(0.0).sqrt()
+            })
         })
     }
 

@@ -37,6 +37,8 @@ pub struct PolynomialCurve {
     /// Arc length of the whole where this part begins.
     offset_lu: f64,
     length_lu: f64,
+    /// The parameter at both ends, in the first and the last panel.
+    ends_ratio: [f64; 2],
     /// Added to the pieces: at the start of the whole, and per arc length.
     shift: AxisVector,
     shift_slope: AxisVector,
@@ -49,8 +51,13 @@ impl PolynomialCurve {
         let table = Arc::new(ArcLengthTable::new(geometry.clone(), linear));
         let length_lu = table.length_lu();
         let panels = [0, table.panels().len().saturating_sub(1)];
+        let ends_ratio = match table.panels() {
+            [] => [0.0; 2],
+            [first, ..] => [first.ends_ratio[0], table.panels()[panels[1]].ends_ratio[1]],
+        };
         let mut curve = Self {
             table,
+            ends_ratio,
             start,
             end,
             panels,
@@ -131,8 +138,6 @@ impl PolynomialCurve {
     /// The part from `start_lu` to `end_lu`, both inside the curve and in order.
     pub(super) fn trimmed(&self, start_lu: f64, end_lu: f64) -> Self {
         let mut part = self.clone();
-        part.start = self.at(start_lu).position;
-        part.end = self.at(end_lu).position;
         part.offset_lu = self.offset_lu + start_lu;
         part.length_lu = end_lu - start_lu;
         let (from_lu, to_lu) = (part.offset_lu, self.offset_lu + end_lu);
@@ -143,6 +148,21 @@ impl PolynomialCurve {
         let [low, high] = self.panels;
         let first = (low + first).min(high);
         part.panels = [first, (low + last).max(first).min(high)];
+        // Places are those of the whole, so that neighbours meet to the last bit.
+        if start_lu > 0.0
+            && let Some((index, u)) = self.place(start_lu)
+        {
+            part.start = self.state_in(index, u, from_lu).position;
+            let border = self.table.panels()[part.panels[0]].ends_ratio[0];
+            part.ends_ratio[0] = if index == part.panels[0] { u } else { border };
+        }
+        if end_lu < self.length_lu
+            && let Some((index, u)) = self.place(end_lu)
+        {
+            part.end = self.state_in(index, u, to_lu).position;
+            let border = self.table.panels()[part.panels[1]].ends_ratio[1];
+            part.ends_ratio[1] = if index == part.panels[1] { u } else { border };
+        }
         part
     }
 
@@ -151,17 +171,36 @@ impl PolynomialCurve {
         self.table.panels().get(first..=last).unwrap_or(&[])
     }
 
+    /// The panel in which the place `s_lu` of this part lies, and the parameter there; `None`: nothing moves.
+    fn place(&self, s_lu: f64) -> Option<(usize, f64)> {
+        let panels = self.own_panels();
+        let last = panels.len().checked_sub(1)?;
+        // The ends are asked for most, and their parameters are known.
+        if s_lu <= 0.0 {
+            return Some((self.panels[0], self.ends_ratio[0]));
+        }
+        if s_lu >= self.length_lu {
+            return Some((self.panels[1], self.ends_ratio[1]));
+        }
+        let along_lu = self.offset_lu + s_lu;
+        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(last);
+        Some((self.panels[0] + index, self.table.parameter_at(&panels[index], along_lu)))
+    }
+
     /// The pieces with what is added to them at s of this part.
     fn state_at(&self, s_lu: f64) -> CurveState {
-        let along_lu = self.offset_lu + s_lu;
-        let panels = self.own_panels();
-        let index = panels.partition_point(|panel| panel.lengths_lu[1] < along_lu).min(panels.len().saturating_sub(1));
-        let Some(panel) = panels.get(index) else {
-            let still = AxisVector::zero();
-            return CurveState { position: self.start, first: still, second: still, third: still };
-        };
-        let u = self.table.parameter_at(panel, along_lu);
-        let mut state = self.pieces_at(panel, u);
+        match self.place(s_lu) {
+            Some((index, u)) => self.state_in(index, u, self.offset_lu + s_lu),
+            None => {
+                let still = AxisVector::zero();
+                CurveState { position: self.start, first: still, second: still, third: still }
+            }
+        }
+    }
+
+    /// The same in a panel at u, `along_lu` from the start of the whole.
+    fn state_in(&self, panel: usize, u: f64, along_lu: f64) -> CurveState {
+        let mut state = self.pieces_at(&self.table.panels()[panel], u);
         state.position.0 += self.shift + self.shift_slope * along_lu;
         state.first += self.shift_slope;
         state

@@ -65,7 +65,31 @@ fn divided(n: &Derivatives, [d0, d1, d2, d3]: [f64; 4], linear: &PerAxis<bool>) 
     q
 }
 
-/// |dq/du| over the axes that count, of the piece in the form that the quadrature evaluates often.
+/// |dq/du| over the axes that count, at several places: what a quadrature asks for.
+pub(super) fn speeds<const N: usize>(
+    piece: &PolynomialPiece,
+    linear: &PerAxis<bool>,
+    counted: &PerAxis<bool>,
+    places: &[f64; N],
+) -> [f64; N] {
+    if !is_plain(piece) {
+        return places.map(|u| speed(piece, linear, counted, u));
+    }
+    // Axis by axis over all places, so that the places go through the processor side by side.
+    let n = &piece.numerator_lu;
+    let mut squares = [0.0; N];
+    for (i, _) in counted.as_slice().iter().enumerate().filter(|(_, counts)| **counts) {
+        let c = n.each_ref().map(|vector| vector.as_slice()[i]);
+        let (c2, c3, c4, c5) = (2.0 * c[2], 3.0 * c[3], 4.0 * c[4], 5.0 * c[5]);
+        for (square, u) in squares.iter_mut().zip(places) {
+            let slope = c[1] + u * (c2 + u * (c3 + u * (c4 + u * c5)));
+            *square += slope * slope;
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+/// |dq/du| over the axes that count.
 pub(super) fn speed(piece: &PolynomialPiece, linear: &PerAxis<bool>, counted: &PerAxis<bool>, u: f64) -> f64 {
     let n = &piece.numerator_lu;
     let plain = is_plain(piece);

@@ -15,9 +15,9 @@
 //! Does not know pieces, windows or time laws.
 
 use super::estimate::{Pace, bend_cap, ray_cap, ray_exponent};
-use super::grid::{Derivatives, Interval};
 use super::held::{slowed, tighten};
 use super::interior_point::{Outcome, Problem, Solver};
+use super::interval::{Derivatives, Interval};
 use super::rows::{NodeRows, Range, Scale};
 use crate::feed::Limit;
 

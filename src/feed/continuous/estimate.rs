@@ -4,7 +4,7 @@
 //! fastest rise along the path ([`Pace`]).
 //! Does not keep limits: the problem does.
 
-use super::grid::{Derivatives, Interval};
+use super::interval::{Derivatives, Interval};
 
 /// Rounds for the time of an interval.
 const PACE_ROUNDS: usize = 3;

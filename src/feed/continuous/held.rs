@@ -5,7 +5,7 @@
 //! Does not plan.
 
 use super::chain::{Chain, Look, PathPoint, Profile};
-use super::grid::{AxisBound, Derivatives, Interval};
+use super::interval::{AxisBound, Derivatives, Interval};
 use crate::feed::{Limit, LimitKind};
 
 /// How far below the share that would just do.
@@ -25,7 +25,7 @@ const NEAR_RATIO: f64 = 0.7;
 
 impl Profile {
     /// State inside an interval, `share` of its length from its start.
-    fn inside(&self, chain: &Chain, index: usize, share: f64) -> (PathPoint, f64) {
+    pub fn inside(&self, chain: &Chain, index: usize, share: f64) -> (PathPoint, f64) {
         let (point, bend) = (self.points[index], self.bends_per_s2[index]);
         let x = share * chain.intervals[index].length_lu();
         let b = point.speed_squared_lu2_s2 + x * (point.slope_lu_s2 + 0.5 * x * bend);

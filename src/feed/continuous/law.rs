@@ -5,38 +5,44 @@
 //! Does not look at limits.
 
 use super::chain::{Chain, PathPoint, Profile};
+use super::layout::Place;
 use crate::feed::{Limit, Phase, TimeLaw};
 
 /// Below this |z| the series of the duration is exact.
 const SERIES_MAX_RATIO: f64 = 0.02;
 
-/// The law over some intervals of a chain: those of one piece. `limits`: what holds each.
-pub(super) fn law(
-    chain: &Chain,
-    profile: &Profile,
-    range: std::ops::Range<usize>,
-    limits: impl Fn(usize) -> Limit,
-) -> TimeLaw {
-    TimeLaw::new(range.map(|index| {
+/// The law of a piece. `limits`: what holds each interval.
+pub(super) fn law(chain: &Chain, profile: &Profile, place: &Place, limits: impl Fn(usize) -> Limit) -> TimeLaw {
+    if let Some([from_lu, to_lu]) = place.part_lu {
+        let index = place.intervals.start;
+        let length_lu = chain.intervals[index].length_lu();
+        let points = [from_lu, to_lu].map(|way_lu| profile.inside(chain, index, way_lu / length_lu).0);
+        return TimeLaw::new([phase(0.0, to_lu - from_lu, points, profile.bends_per_s2[index], limits(index))]);
+    }
+    TimeLaw::new(place.intervals.clone().map(|index| {
         let interval = &chain.intervals[index];
         let points = [profile.points[index], profile.points[index + 1]];
-        let limit = limits(index);
-        let [from, to] = points.map(|point| point.speed_squared_lu2_s2);
-        if from <= 0.0 || to <= 0.0 {
-            return rest_phase(interval.start_lu, interval.length_lu(), points, interval.bounds.jerk_limited, limit);
+        let (start_lu, length_lu, limit) = (interval.start_lu, interval.length_lu(), limits(index));
+        if points.iter().any(|point| point.speed_squared_lu2_s2 <= 0.0) {
+            return rest_phase(start_lu, length_lu, points, interval.bounds.jerk_limited, limit);
         }
-        let rate_per_s2 = 0.5 * profile.bends_per_s2[index];
-        let (v0, v1) = (from.sqrt(), to.sqrt());
-        Phase {
-            duration_s: duration_s(interval.length_lu(), v0 + v1, rate_per_s2),
-            start_lu: interval.start_lu,
-            velocity_lu_s: v0,
-            acceleration_lu_s2: 0.5 * points[0].slope_lu_s2,
-            jerk_lu_s3: 0.0,
-            rate_per_s2,
-            limit,
-        }
+        phase(start_lu, length_lu, points, profile.bends_per_s2[index], limit)
     }))
+}
+
+/// Between two places where the path moves.
+fn phase(start_lu: f64, length_lu: f64, points: [PathPoint; 2], bend_per_s2: f64, limit: Limit) -> Phase {
+    let [v0, v1] = points.map(|point| point.speed_squared_lu2_s2.sqrt());
+    let rate_per_s2 = 0.5 * bend_per_s2;
+    Phase {
+        duration_s: duration_s(length_lu, v0 + v1, rate_per_s2),
+        start_lu,
+        velocity_lu_s: v0,
+        acceleration_lu_s2: 0.5 * points[0].slope_lu_s2,
+        jerk_lu_s3: 0.0,
+        rate_per_s2,
+        limit,
+    }
 }
 
 /// With `s'' = a + k s` the ends of a phase obey `h = (v0 + v1) tanh(√k T/2)/√k`.

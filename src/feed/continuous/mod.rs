@@ -9,18 +9,24 @@
 mod chain;
 mod estimate;
 mod grid;
+mod group;
 mod held;
+mod interval;
 mod interior_point;
 mod law;
+mod layout;
 mod refuge;
 mod rows;
 
 use super::limits::AxisRules;
 use super::profile::SpeedCap;
 use super::{Limit, LimitKind, TimeLaw};
-use crate::kinematics::JointPath;
-use chain::{Chain, Junction, Look, Planning, Profile, Start};
-use grid::{Derivatives, End, Grid};
+use crate::kinematics::{JointPath, JointState};
+use chain::{Chain, Look, PathPoint, Planning, Profile, Start};
+use grid::{End, Grid, throughout};
+use group::{Brief, Stretch};
+use interval::{Derivatives, Tangent};
+use layout::{Layout, Place};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -31,10 +37,10 @@ const REACH_RATIO: f64 = 4.0;
 const DISTURBED_RATIO: f64 = 1.6;
 
 /// Intervals of a plan at least, if the window has them.
-const REACH_INTERVALS: usize = 24;
+const REACH_INTERVALS: f64 = 24.0;
 
-/// Where a plan begins or ends at rest in the middle of a path, its first and last interval are cut like this.
-const CUTS_RATIO: [f64; 5] = [0.0, 0.08, 0.2, 0.5, 1.0];
+/// Places nearer to each other than this share of an interval are one.
+const SAME_PLACE_RATIO: f64 = 1e-9;
 
 /// A piece that moves, as this law sees it.
 #[derive(Clone, Debug)]
@@ -43,6 +49,9 @@ pub(super) struct Flow {
     blend: bool,
     /// About the highest speeds at its ends.
     ends_lu_s: [f64; 2],
+    tangent: Tangent,
+    /// All of it as one interval, where it is that short and smooth.
+    brief: Option<Box<Brief>>,
     grid: Option<Grid>,
 }
 
@@ -62,13 +71,13 @@ pub(super) struct Continuous {
     planning: Planning,
     chain: Chain,
     profile: Profile,
-    /// Intervals of each piece that has not been handed out yet, front first.
-    pieces: VecDeque<usize>,
+    /// Where in the chain the pieces are that have not been handed out yet, front first.
+    places: VecDeque<Place>,
     /// Interval with which the front begins.
     first: usize,
     /// Intervals from the start of the chain whose law is kept.
     kept: usize,
-    /// Intervals before this one are those of the pieces as they are.
+    /// Intervals from here on are there for the stop at the end of the window only.
     uncut: usize,
     /// Intervals from here on brake for the end of the window, and from there on they feel it.
     braking: usize,
@@ -78,68 +87,126 @@ pub(super) struct Continuous {
 }
 
 impl Flow {
-    /// A piece that moves; its curve has no step of direction or curvature inside.
-    pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool) -> Self {
-        let ends_lu_s = grid::end_speeds_lu_s(&rules, path);
-        Self { rules, blend, ends_lu_s, grid: None }
+    /// A piece that moves; its curve has no step of direction or curvature inside. `ends`: the states there.
+    pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool, ends: [&JointState; 2]) -> Self {
+        let ends = ends.map(|state| Derivatives::from(*state));
+        let tangent = Tangent::new(throughout(&rules, path), blend, &ends[0].first);
+        let brief = if blend { None } else { Brief::new(&rules, path, &tangent, ends).map(Box::new) };
+        let ends_lu_s = match &brief {
+            Some(brief) => [brief.speed_lu_s; 2],
+            None => grid::end_speeds_lu_s(&rules, path),
+        };
+        Self { rules, blend, ends_lu_s, tangent, brief, grid: None }
     }
 
     /// Highest constant speeds at its ends; not positive or no number: nothing can move there.
     pub fn ends_lu_s(&self) -> [f64; 2] {
         self.ends_lu_s
     }
+
+    /// The way that a stop from its highest speed takes, about.
+    fn stop_lu(&self) -> Option<f64> {
+        let brief = self.brief.as_ref().map(|brief| self.tangent.stop_lu(brief.speed_lu_s));
+        brief.or_else(|| self.grid.as_ref().map(|grid| grid.stop_lu))
+    }
 }
 
 impl Continuous {
     /// The front piece has a law that stays.
     pub fn holds_front(&self) -> bool {
-        self.pieces.front().is_some_and(|count| self.first + count <= self.kept)
+        self.places.front().is_some_and(|place| place.intervals.end <= self.kept)
     }
 
     /// Plans again from the start of the front piece. `pieces`: the window in order, without what does not move, up to a rest at most.
     pub fn plan(&mut self, pieces: &mut [Piece<'_>]) {
         let start = self.start();
-        let count = cut_pieces(pieces, start);
-        let pieces = &pieces[..count];
+        let known = self.known().min(pieces.len().saturating_sub(1));
+        let count = reach(pieces, known, start);
+        let pieces = &mut pieces[..count];
+        let entry_lu2_s2 = match self.places.get(known) {
+            Some(place) => self.profile.points[place.intervals.start].speed_squared_lu2_s2,
+            None => self.profile.points.get(self.first).map_or(0.0, |point| point.speed_squared_lu2_s2),
+        };
+        let speeds_lu_s = group::border_speeds(pieces, known, entry_lu2_s2.sqrt());
+        let stretches = group::stretches(pieces, known, &speeds_lu_s, start == Start::Rest);
+        let mut first = known;
+        for stretch in &stretches {
+            if let Stretch::Cut = stretch {
+                cut_piece(pieces, first, start);
+            }
+            first += stretch.pieces();
+        }
+        let pieces = &*pieces;
         let Some(last) = pieces.last() else { return };
         let rests = last.rests_after;
-        let mut chain = Chain::default();
-        let mut firsts = Vec::with_capacity(count);
-        for (index, piece) in pieces.iter().enumerate() {
-            firsts.push(chain.intervals.len());
-            add_piece(&mut chain, piece, index == 0 && start == Start::Rest, index + 1 == count);
-        }
-        let ends = firsts.iter().skip(1).chain([&chain.intervals.len()]).copied().collect::<Vec<_>>();
-        let counts: VecDeque<usize> = firsts.iter().zip(ends).map(|(first, end)| end - first).collect();
+        let mut layout = Layout::continued(&self.chain, self.places.range(..known));
+        layout.extend(pieces, known, stretches, start == Start::Rest);
+        let Layout { mut chain, places, owners, uncut } = layout;
         let look = |index: usize, s_lu: f64| {
-            let piece = firsts.partition_point(|first| *first <= index).saturating_sub(1);
-            Derivatives::from(pieces[piece].path.at(s_lu))
+            let paths = pieces[owners[index]..].iter().map(|piece| piece.path);
+            let place = group::place(paths, s_lu).unwrap_or((pieces[owners[index]].path, s_lu));
+            Derivatives::from(place.0.at(place.1))
         };
         let Some(profile) = self.attempt(&mut chain, start, &look) else {
             // What was planned before still stands, to its end.
             self.kept = self.chain.intervals.len();
-            if self.pieces.is_empty() {
+            if self.places.is_empty() {
                 self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
             }
             return;
         };
-        let cut = if rests { 0 } else { CUTS_RATIO.len() - 1 };
-        self.uncut = chain.intervals.len() - cut;
-        (self.chain, self.profile, self.pieces, self.first) = (chain, profile, counts, 0);
+        (self.chain, self.profile, self.places) = (chain, profile, places);
+        (self.first, self.uncut) = (0, uncut);
         self.keep(rests);
+    }
+
+    /// How many pieces from the front on stay cut as they are: those that do not brake for the end of the window or, where all do, all but the last,
+    /// whose intervals are those of a stop.
+    fn known(&self) -> usize {
+        let braking = if self.braking > self.first { self.braking } else { usize::MAX };
+        let known = self.places.iter().take_while(|place| place.intervals.end <= braking).count();
+        let known = known.min(self.places.len().saturating_sub(1));
+        // All pieces of an interval, or none.
+        let shared = |known: usize| known > 0 && self.places[known - 1].intervals == self.places[known].intervals;
+        (0..=known).rev().find(|known| !shared(*known)).unwrap_or(0)
     }
 
     /// A profile for `chain`. What is left of the plan before is a way that keeps every limit; where it does not brake for its own end it is about the
     /// fastest as well.
     fn attempt(&mut self, chain: &mut Chain, start: Start, look: &Look<'_>) -> Option<Profile> {
-        let left = self.first..self.uncut.max(self.first);
-        let points = self.profile.points.get(left).unwrap_or(&[]);
-        let fast = points.get(..self.braking.saturating_sub(self.first)).unwrap_or(points);
-        let planned = self.planning.plan(chain, start, fast, look);
-        if planned.is_some() || points.len() <= fast.len() {
+        let (points, fast) = self.hints(chain);
+        let planned = self.planning.plan(chain, start, &points[..fast], look);
+        if planned.is_some() || points.len() <= fast {
             return planned;
         }
-        self.planning.plan(chain, start, points, look)
+        self.planning.plan(chain, start, &points, look)
+    }
+
+    /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
+    fn hints(&self, chain: &Chain) -> (Vec<PathPoint>, usize) {
+        let end = self.uncut.max(self.first);
+        let (mut points, mut fast) = (Vec::with_capacity(chain.intervals.len()), 0);
+        let (mut index, mut way_lu) = (self.first, 0.0);
+        for interval in &chain.intervals {
+            while index < end && way_lu >= self.chain.intervals[index].length_lu() * (1.0 - SAME_PLACE_RATIO) {
+                way_lu -= self.chain.intervals[index].length_lu();
+                index += 1;
+            }
+            if index >= end {
+                break;
+            }
+            let share = (way_lu / self.chain.intervals[index].length_lu()).max(0.0);
+            points.push(if share <= SAME_PLACE_RATIO {
+                self.profile.points[index]
+            } else {
+                self.profile.inside(&self.chain, index, share).0
+            });
+            if index < self.braking {
+                fast = points.len();
+            }
+            way_lu += interval.length_lu();
+        }
+        (points, fast)
     }
 
     /// The law of the front piece, which is handed out.
@@ -147,15 +214,14 @@ impl Continuous {
         if let Some(law) = self.refuge.take() {
             return Some(law);
         }
-        let count = self.pieces.pop_front()?;
-        let range = self.first..self.first + count;
-        self.first = range.end;
+        let place = self.places.pop_front()?;
+        self.first = self.places.front().map_or(place.intervals.end, |next| next.intervals.start);
         let limit = |index| {
             let limit = self.profile.limit(&self.chain, index);
             let felt = index >= self.braking || (index >= self.disturbed && limit.axis.is_some());
             if felt { Limit { kind: LimitKind::LookAhead, axis: None } } else { limit }
         };
-        Some(law::law(&self.chain, &self.profile, range, limit))
+        Some(law::law(&self.chain, &self.profile, &place, limit))
     }
 
     fn start(&self) -> Start {
@@ -187,74 +253,54 @@ impl Continuous {
     }
 }
 
-/// Cuts the pieces that a plan reaches into intervals; how many these are.
-fn cut_pieces(pieces: &mut [Piece<'_>], start: Start) -> usize {
-    let (mut beyond_ratio, mut intervals) = (0.0, 0);
+/// How many pieces a plan reaches; those that are no intervals by themselves get their grids. The first `known` ones have places already.
+fn reach(pieces: &mut [Piece<'_>], known: usize, start: Start) -> usize {
+    let (mut beyond_ratio, mut intervals) = (0.0, 0.0);
     for index in 0..pieces.len() {
-        let junction_lu_s = |piece: &Piece<'_>| piece.junction.velocity_lu_s;
-        let before = index.checked_sub(1).map(|before| pieces[before].flow.ends_lu_s[1]);
-        let after = pieces.get(index + 1).map(|next| (next.flow.ends_lu_s[0], junction_lu_s(next)));
-        let piece = &mut pieces[index];
-        let length_lu = piece.path.length_lu();
-        if piece.flow.grid.is_none() {
-            let own = piece.flow.ends_lu_s;
-            let first = match before {
-                Some(before_lu_s) => End::Speed(own[0].min(before_lu_s).min(piece.junction.velocity_lu_s)),
-                None if start == Start::Rest => End::Rest,
-                None => End::Speed(own[0]),
-            };
-            let last = match after {
-                _ if piece.rests_after => End::Rest,
-                Some((next_lu_s, junction_lu_s)) => End::Speed(own[1].min(next_lu_s).min(junction_lu_s)),
-                None => End::Speed(own[1]),
-            };
-            piece.flow.grid = Some(Grid::new(&piece.flow.rules, piece.path, piece.flow.blend, [first, last]));
+        let length_lu = pieces[index].path.length_lu();
+        // A piece at a rest is cut by its own grid.
+        let at_rest = (index == 0 && start == Start::Rest) || pieces[index].rests_after;
+        let flow = &pieces[index].flow;
+        if index >= known && (at_rest || flow.brief.is_none()) {
+            cut_piece(pieces, index, start);
         }
-        let Some(grid) = &piece.flow.grid else { continue };
-        intervals += grid.intervals.len();
+        let flow = &pieces[index].flow;
+        let Some(stop_lu) = flow.stop_lu() else { continue };
+        intervals += match (&flow.grid, &flow.brief) {
+            (_, Some(brief)) => length_lu / (brief.speed_lu_s * flow.tangent.step_s),
+            (Some(grid), None) => grid.intervals.len() as f64,
+            (None, None) => 0.0,
+        };
         if index > 0 {
             // Each way in stopping distances of its own speed.
-            beyond_ratio += length_lu / grid.stop_lu;
+            beyond_ratio += length_lu / stop_lu;
         }
-        if beyond_ratio >= REACH_RATIO && intervals >= REACH_INTERVALS {
+        if beyond_ratio >= REACH_RATIO && intervals >= REACH_INTERVALS && index >= known {
             return index + 1;
         }
     }
     pieces.len()
 }
 
-/// Appends the intervals of a piece; where the plan begins or ends at rest there and the grid was not made for it, the first or last
-/// interval is cut.
-fn add_piece(chain: &mut Chain, piece: &Piece<'_>, starts_at_rest: bool, ends_at_rest: bool) {
-    let Some(grid) = &piece.flow.grid else { return };
-    let cut_first = starts_at_rest && !grid.rests[0];
-    let cut_last = ends_at_rest && !grid.rests[1];
-    let count = grid.intervals.len();
-    let at_start = Junction {
-        speed_squared_lu2_s2: piece.junction.velocity_lu_s * piece.junction.velocity_lu_s,
-        limit: piece.junction.limit,
-    };
-    let free = Junction { speed_squared_lu2_s2: f64::INFINITY, limit: at_start.limit };
-    let mut junction = if starts_at_rest { free } else { at_start };
-    for (index, interval) in grid.intervals.iter().enumerate() {
-        let mut borders = vec![];
-        let h = interval.length_lu();
-        if cut_first && index == 0 {
-            borders.extend(CUTS_RATIO.map(|ratio| interval.start_lu + ratio * h));
-        }
-        if cut_last && index + 1 == count {
-            let from = borders.pop().unwrap_or(interval.start_lu);
-            let rest_lu = interval.end_lu - from;
-            borders.extend(CUTS_RATIO.iter().rev().map(|ratio| interval.end_lu - ratio * rest_lu));
-        }
-        if borders.is_empty() {
-            chain.intervals.push(interval.clone());
-            chain.junctions.push(std::mem::replace(&mut junction, free));
-            continue;
-        }
-        for pair in borders.windows(2).filter(|pair| pair[1] > pair[0]) {
-            chain.intervals.push(interval.part(piece.path, pair[0], pair[1]));
-            chain.junctions.push(std::mem::replace(&mut junction, free));
-        }
+/// Makes the grid of a piece, if it has none.
+fn cut_piece(pieces: &mut [Piece<'_>], index: usize, start: Start) {
+    if pieces[index].flow.grid.is_some() {
+        return;
     }
+    let junction_lu_s = |piece: &Piece<'_>| piece.junction.velocity_lu_s;
+    let before = index.checked_sub(1).map(|before| pieces[before].flow.ends_lu_s[1]);
+    let after = pieces.get(index + 1).map(|next| (next.flow.ends_lu_s[0], junction_lu_s(next)));
+    let piece = &mut pieces[index];
+    let own = piece.flow.ends_lu_s;
+    let first = match before {
+        Some(before_lu_s) => End::Speed(own[0].min(before_lu_s).min(piece.junction.velocity_lu_s)),
+        None if start == Start::Rest => End::Rest,
+        None => End::Speed(own[0]),
+    };
+    let last = match after {
+        _ if piece.rests_after => End::Rest,
+        Some((next_lu_s, junction_lu_s)) => End::Speed(own[1].min(next_lu_s).min(junction_lu_s)),
+        None => End::Speed(own[1]),
+    };
+    piece.flow.grid = Some(Grid::new(&piece.flow.rules, piece.path, piece.flow.blend, [first, last]));
 }

@@ -3,7 +3,8 @@
 //! In: the intervals of a piece. Out: a seven-phase [`TimeLaw`] with the greatest demands of the whole piece: at the highest speed the bend takes half of
 //! what each axis allows, and changes of speed take the rest. Used where no plan was found from a state of rest.
 
-use super::grid::{Grid, Interval};
+use super::grid::Grid;
+use super::interval::Interval;
 use crate::feed::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use crate::feed::ramp::Dynamics;
 use crate::feed::{Limit, LimitKind, TimeLaw};

@@ -6,8 +6,8 @@
 //! Does not solve.
 
 use super::chain::{Chain, PathPoint, Start};
-use super::grid::{AxisBound, Derivatives, Interval};
 use super::interior_point::{Problem, Transition};
+use super::interval::{AxisBound, Derivatives, Interval};
 
 /// How far above its estimate b is thought to come.
 const REACH_RATIO: f64 = 1.5;

@@ -1,0 +1,126 @@
+//! Where the pieces of a window lie in a chain of intervals.
+//!
+//! In: a chain that is known and the pieces after it. Out: a longer [`Chain`] with the [`Place`] of each piece in it and the piece with which each
+//! interval begins. A piece has one or more intervals, or shares one with its neighbours (`group`). The chain ends at rest.
+//! Does not plan.
+
+use super::Piece;
+use super::chain::{Chain, Junction};
+use super::group::Stretch;
+use std::collections::VecDeque;
+use std::ops::Range;
+
+/// Where a plan begins or ends at rest in the middle of a path, its first and last interval are cut like this.
+const CUTS_RATIO: [f64; 5] = [0.0, 0.08, 0.2, 0.5, 1.0];
+
+/// Where a piece is in a chain.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    pub intervals: Range<usize>,
+    /// What it has of the one interval that it shares, from the start of that; `None`: all of its intervals.
+    pub part_lu: Option<[f64; 2]>,
+}
+
+/// A chain and what its intervals belong to.
+#[derive(Debug, Default)]
+pub(super) struct Layout {
+    pub chain: Chain,
+    pub places: VecDeque<Place>,
+    /// The piece with which each interval begins.
+    pub owners: Vec<usize>,
+    /// Intervals from here on are there for the stop at the end only.
+    pub uncut: usize,
+}
+
+impl Layout {
+    /// The intervals of the pieces at `places`, which follow each other.
+    pub fn continued<'a>(chain: &Chain, places: impl Iterator<Item = &'a Place>) -> Self {
+        let mut layout = Self { uncut: usize::MAX, ..Self::default() };
+        let mut shift = None;
+        for (piece, place) in places.enumerate() {
+            let shift = *shift.get_or_insert(place.intervals.start);
+            let known = layout.chain.intervals.len();
+            let (start, end) = (place.intervals.start - shift, place.intervals.end - shift);
+            for index in known.max(start)..end {
+                layout.chain.intervals.push(chain.intervals[shift + index].clone());
+                layout.chain.junctions.push(chain.junctions[shift + index]);
+                layout.owners.push(piece);
+            }
+            layout.places.push_back(Place { intervals: start..end, part_lu: place.part_lu });
+        }
+        layout
+    }
+
+    /// Appends `pieces[from..]`, which are these stretches, with a stop at their end.
+    pub fn extend(&mut self, pieces: &[Piece<'_>], from: usize, stretches: Vec<Stretch>, starts_at_rest: bool) {
+        let mut first = from;
+        for stretch in stretches {
+            match stretch {
+                Stretch::Cut => {
+                    let last = first + 1 == pieces.len();
+                    self.cut(&pieces[first], first, starts_at_rest && first == 0, last);
+                    first += 1;
+                }
+                Stretch::Group(count, interval) => {
+                    let index = self.chain.intervals.len();
+                    self.chain.intervals.push(*interval);
+                    self.chain.junctions.push(junction(&pieces[first]));
+                    self.owners.push(first);
+                    let mut from_lu = 0.0;
+                    for piece in &pieces[first..first + count] {
+                        let to_lu = from_lu + piece.path.length_lu();
+                        let part_lu = (count > 1).then_some([from_lu, to_lu]);
+                        self.places.push_back(Place { intervals: index..index + 1, part_lu });
+                        from_lu = to_lu;
+                    }
+                    first += count;
+                }
+            }
+        }
+        self.uncut = self.uncut.min(self.chain.intervals.len());
+    }
+
+    /// Appends the grid of a piece; where the plan begins or ends at rest there and the grid was not made for it, the first or last interval is cut.
+    fn cut(&mut self, piece: &Piece<'_>, owner: usize, starts_at_rest: bool, ends_at_rest: bool) {
+        let start = self.chain.intervals.len();
+        let grid = piece.flow.grid.as_ref();
+        let count = grid.map_or(0, |grid| grid.intervals.len());
+        let rests = grid.map_or([false; 2], |grid| grid.rests);
+        let (cut_first, cut_last) = (starts_at_rest && !rests[0], ends_at_rest && !rests[1]);
+        let at_start = junction(piece);
+        let free = Junction { speed_squared_lu2_s2: f64::INFINITY, limit: at_start.limit };
+        let mut junction = if starts_at_rest { free } else { at_start };
+        for (index, interval) in grid.into_iter().flat_map(|grid| grid.intervals.iter().enumerate()) {
+            let mut borders = vec![];
+            let h = interval.length_lu();
+            if cut_first && index == 0 {
+                borders.extend(CUTS_RATIO.map(|ratio| interval.start_lu + ratio * h));
+            }
+            if cut_last && index + 1 == count {
+                let from = borders.pop().unwrap_or(interval.start_lu);
+                let rest_lu = interval.end_lu - from;
+                self.uncut = self.chain.intervals.len();
+                borders.extend(CUTS_RATIO.iter().rev().map(|ratio| interval.end_lu - ratio * rest_lu));
+            }
+            if borders.is_empty() {
+                self.chain.intervals.push(interval.clone());
+                self.chain.junctions.push(std::mem::replace(&mut junction, free));
+                continue;
+            }
+            for pair in borders.windows(2).filter(|pair| pair[1] > pair[0]) {
+                self.chain.intervals.push(interval.part(piece.path, pair[0], pair[1]));
+                self.chain.junctions.push(std::mem::replace(&mut junction, free));
+            }
+        }
+        let end = self.chain.intervals.len();
+        self.owners.resize(end, owner);
+        self.places.push_back(Place { intervals: start..end, part_lu: None });
+    }
+}
+
+fn junction(piece: &Piece<'_>) -> Junction {
+    Junction {
+        speed_squared_lu2_s2: piece.junction.velocity_lu_s * piece.junction.velocity_lu_s,
+        limit: piece.junction.limit,
+    }
+}
