@@ -240,7 +240,7 @@ fn known(finding: &Finding) -> bool {
 #[cfg(feature = "optimal")]
 #[test]
 fn near_the_optimum() {
-    let (first, count) = (number("PROOF_FIRST", 0), number("PROOF_PROGRAMS", 4).min(100));
+    let (first, count) = (number("PROOF_FIRST", 0), number("PROOF_PROGRAMS", 3).min(100));
     let mut losses: Vec<(f64, u64)> = Vec::new();
     let mut unsolved = Vec::new();
     for seed in first..first + count {
