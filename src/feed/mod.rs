@@ -19,6 +19,7 @@ mod published;
 pub mod ramp;
 mod rules;
 mod scan;
+mod spindle;
 mod split;
 mod varying;
 mod wire;

@@ -10,5 +10,6 @@ mod profile;
 mod programmed_time;
 mod published;
 mod sampled;
+mod spindle;
 mod support;
 mod window;

@@ -68,7 +68,7 @@ impl Planner {
         if !matches!(front.motion, Motion::Flows(_)) {
             return None;
         }
-        let path = front.path.clone();
+        let length_lu = front.path.length_lu();
         let mut window = Window { entries, admitted: *admitted, ends_path };
         let mut course = Course { overrides, now_s: *elapsed_s, phases: Vec::new(), retry_s: 0.0 };
         let mut planned = false;
@@ -88,8 +88,8 @@ impl Planner {
             if planned {
                 continue;
             }
-            let end_lu = continuous.front_end_lu(&path);
-            let rests_inside = end_lu < path.length_lu();
+            let end_lu = continuous.front_end_lu().unwrap_or(length_lu);
+            let rests_inside = end_lu < length_lu;
             continuous.pass_front(rests_inside.then_some(end_lu));
             if !rests_inside {
                 break;
