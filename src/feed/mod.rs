@@ -21,6 +21,7 @@ mod rules;
 mod scan;
 mod spindle;
 mod split;
+mod synchronised;
 mod varying;
 mod wire;
 mod worst;

@@ -19,6 +19,7 @@ use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
 use super::published::{self, Tally};
 use super::spindle::Spindle;
 use super::split::{self, Part};
+use super::synchronised::SynchronisedActions;
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
@@ -75,8 +76,11 @@ pub struct Planner {
     half_blend_lu: f64,
     /// The law `continuous`; `None` under `seven-phase`.
     continuous: Option<Box<Continuous>>,
-    /// The feed override at run time.
+    /// The feed override at run time, and what acts on it.
     overrides: OverrideCourse,
+    actions: SynchronisedActions,
+    /// Where the override holds the path for ever, and whether that has been told.
+    held: Option<(BlockRef, bool)>,
 }
 
 /// A piece in the window or before it.
@@ -151,6 +155,8 @@ impl Planner {
             half_blend_lu: 0.0,
             continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
             overrides: OverrideCourse::new(&OverrideSchedule::none(), machine.cycle.time_base),
+            actions: SynchronisedActions::default(),
+            held: None,
         }
     }
 
@@ -168,6 +174,10 @@ impl Planner {
     /// The alarm of the piece handed out last, with its block: the path comes to rest at the end of what was pushed, after
     /// [`Planner::finish`].
     pub fn take_alarm(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        if let Some((block, told @ false)) = &mut self.held {
+            *told = true;
+            return Some((*block, checks::held(*block)));
+        }
         let (block, told) = self.stalled.as_mut()?;
         (!std::mem::replace(told, true)).then(|| (*block, published::stalled(*block)))
     }
@@ -293,9 +303,10 @@ impl Planner {
     /// finished.
     pub fn pop(&mut self) -> Option<PlannedPiece> {
         self.admit();
-        if self.admitted == 0 || !(self.full || self.finished || self.rests > 0) {
+        if self.admitted == 0 || self.held.is_some() || !(self.full || self.finished || self.rests > 0) {
             return None;
         }
+        self.actions.begin(&self.entries.front()?.path, self.elapsed_s);
         let flowing = self.flow();
         if self.continuous.is_none() {
             self.plan_backward();
@@ -325,6 +336,10 @@ impl Planner {
                 None => front.fixed(self.entry, ahead, self.setpoint_period_s),
             },
         };
+        if self.continuous.is_some() && !matches!(front.motion, Motion::Flows(_)) {
+            self.stand_by(&front.path, &law);
+        }
+        self.actions.pass(&front.path);
         let start_s = self.elapsed_s;
         self.elapsed_s += law.duration_s();
         let overrides = self.overrides.steps(start_s, self.elapsed_s);

@@ -12,4 +12,5 @@ mod published;
 mod sampled;
 mod spindle;
 mod support;
+mod synchronised;
 mod window;

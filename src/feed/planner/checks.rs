@@ -6,6 +6,7 @@ use crate::base::Diagnostic;
 use crate::feed::continuous::Flow;
 use crate::feed::limits::PieceLimits;
 use crate::kinematics::JointPath;
+use crate::program::BlockRef;
 
 /// As [`check_motion`], under `continuous`.
 pub(super) fn check_flow(
@@ -70,4 +71,11 @@ pub(super) fn check_time(time_s: f64, path: &JointPath) -> Result<(), Box<Diagno
         Diagnostic::error("P0002", message)
             .help("check its feed, its end position and its dwell, and the velocity limits of the machine"),
     ))
+}
+
+/// The alarm of a path that the override holds for ever.
+pub(super) fn held(block: BlockRef) -> Diagnostic {
+    let message = format!("the feed override is 0 from line {} on, and nothing raises it again", block.line);
+    Diagnostic::error("P0005", message)
+        .help("look at the synchronised actions on $AC_OVR, and at the last change of --override")
 }
