@@ -31,7 +31,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// A plan reaches this many stopping distances beyond the piece that asks for it, if the window does.
-const REACH_RATIO: f64 = 4.0;
+const REACH_RATIO: f64 = 8.0;
 
 /// Of a plan that ends in a stop which is not the program's, the last part is not kept: this many times the way from its last summit.
 const DISTURBED_RATIO: f64 = 1.6;
