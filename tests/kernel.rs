@@ -1,7 +1,7 @@
 //! The kernel as a library and as a loop: snapshot, threads, determinism, figures, alarms.
 
 use sollwert::base::{AxisKind, MachinePoint};
-use sollwert::feed::{Limit, LimitKind};
+use sollwert::feed::{Limit, LimitKind, OverrideSchedule};
 use sollwert::kernel::{Figures, FollowOptions, Kernel, RunOptions, RunOutcome, RunSummary, SetpointTable, Status};
 use sollwert::kernel::{follow, run};
 use sollwert::machine::{Loaded, load};
@@ -44,6 +44,7 @@ fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutco
     let options = RunOptions {
         machine,
         setup: program(text).into(),
+        overrides: OverrideSchedule::none(),
         drives: true,
         recording: Some(path),
         mantissa_bits: None,
@@ -137,6 +138,7 @@ fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
     let options = RunOptions {
         machine: &loaded,
         setup: program(PROGRAM).into(),
+        overrides: OverrideSchedule::none(),
         drives: false,
         recording: None,
         mantissa_bits: None,
@@ -146,6 +148,35 @@ fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
     };
     let refused = run(options, &mut |_| {}).err().expect("not under this law").0;
     assert!(refused.code == "M0201" && refused.message.contains(set.split('=').next().unwrap()), "{refused:?}");
+}
+
+#[test]
+fn a_change_of_the_override_is_the_same_on_any_number_of_threads_and_on_record() {
+    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous"]);
+    let mut recordings = Vec::new();
+    for threads in [1, 2, 2] {
+        let path = scratch(&format!("override_{threads}.mcap"));
+        let overrides = OverrideSchedule::parse("0.5=40,0.9=0,1.3=130").unwrap();
+        let outcome = run(
+            RunOptions {
+                machine: &loaded,
+                setup: program(PROGRAM).into(),
+                overrides,
+                drives: false,
+                recording: Some(&path),
+                mantissa_bits: None,
+                signals: SignalChoice::all(),
+                threads,
+                pace_ratio: None,
+            },
+            &mut |_| {},
+        )
+        .unwrap_or_else(|error| panic!("{:?}", error.0));
+        assert_eq!(outcome.summary.overrides.len(), 3);
+        assert!(outcome.summary.limits["override"] > 0.0);
+        recordings.push(std::fs::read(&path).unwrap());
+    }
+    assert!(recordings.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
 #[test]

@@ -44,6 +44,16 @@ pub const NS_PER_MS: f64 = 1e6;
 /// Millihenry in a henry.
 pub const MH_PER_H: f64 = 1000.0;
 
+/// 1 -> 100 %.
+pub fn percent_from_ratio(value_ratio: f64) -> f64 {
+    100.0 * value_ratio
+}
+
+/// 100 % -> 1.
+pub fn ratio_from_percent(value_percent: f64) -> f64 {
+    value_percent / 100.0
+}
+
 /// m/min -> mm/s.
 pub fn mm_s_from_m_min(velocity_m_min: f64) -> f64 {
     velocity_m_min * MM_PER_M / S_PER_MIN

@@ -5,6 +5,7 @@ use super::inputs::{open_program, refused};
 use super::output::print;
 use super::run::{Style, report};
 use crate::base::Diagnostic;
+use crate::feed::OverrideSchedule;
 use crate::kernel::{self, RunOptions};
 use crate::machine::{DEFAULT_MACHINE, load, shipped};
 use crate::recorder::SignalChoice;
@@ -39,6 +40,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
     let options = RunOptions {
         machine: &machine,
         setup: program.into(),
+        overrides: OverrideSchedule::none(),
         drives: true,
         recording: Some(&recording),
         mantissa_bits: None,

@@ -5,6 +5,7 @@
 use super::failure::Failure;
 use super::output::show;
 use crate::base::Diagnostic;
+use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
 use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, unsupported};
 use crate::program::{ProgramSource, taken_axis_names};
@@ -49,6 +50,22 @@ impl MachineChoice {
         let loaded = self.load()?;
         let refused = unsupported(&loaded.machine);
         if refused.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(refused)) }
+    }
+}
+
+/// What happens at the control panel while a program runs.
+#[derive(Args)]
+pub(super) struct Panel {
+    /// Feed override from a time on, in % of F: 2.5=50,4=120 is 50 % from 2.5 s of the program and 120 % from 4 s; 0 to 200, 0 stops. Rapids are left alone
+    #[arg(long = "override", value_name = "TIME=PERCENT,...")]
+    overrides: Option<String>,
+}
+
+impl Panel {
+    /// The turns of the switch.
+    pub(super) fn overrides(&self) -> Result<OverrideSchedule, Failure> {
+        let Some(text) = &self.overrides else { return Ok(OverrideSchedule::none()) };
+        OverrideSchedule::parse(text).map_err(Failure::unreadable)
     }
 }
 

@@ -3,7 +3,7 @@
 //! In: program, machine, options. Out: a recording, figures as table or JSON, findings. Does not compute any of them.
 
 use super::failure::Failure;
-use super::inputs::{MachineChoice, Surroundings, default_recording, refuse_same_file};
+use super::inputs::{MachineChoice, Panel, Surroundings, default_recording, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show, table};
 use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome, RunSummary};
@@ -22,6 +22,8 @@ pub(super) struct RunArguments {
     machine: MachineChoice,
     #[command(flatten)]
     surroundings: Surroundings,
+    #[command(flatten)]
+    panel: Panel,
     /// Recording to write; default: the program's name with .mcap, in the current folder
     #[arg(short, long, value_name = "TRACE.mcap")]
     output: Option<PathBuf>,
@@ -69,6 +71,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let options = RunOptions {
         machine: &machine,
         setup,
+        overrides: arguments.panel.overrides()?,
         drives: !arguments.no_drives,
         recording: Some(&recording),
         mantissa_bits: arguments.record_precision,

@@ -3,7 +3,7 @@
 //! In: programs, machine. Out: figures as tables or one JSON document. Does not simulate drives.
 
 use super::failure::Failure;
-use super::inputs::{MachineChoice, Surroundings};
+use super::inputs::{MachineChoice, Panel, Surroundings};
 use super::output::{ProgressLine, print, print_json, show};
 use super::run::{Style, figures_text};
 use super::what_if;
@@ -29,6 +29,8 @@ pub(super) struct TimeArguments {
     machine: MachineChoice,
     #[command(flatten)]
     surroundings: Surroundings,
+    #[command(flatten)]
+    panel: Panel,
     /// The least time in which the same path can be driven under the same limits, and the control's share of it
     #[arg(long)]
     optimal: bool,
@@ -44,6 +46,16 @@ pub(super) struct TimeArguments {
 }
 
 pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
+    let overrides = arguments.panel.overrides()?;
+    if !overrides.changes().is_empty() && (arguments.optimal || arguments.what_if) {
+        return Err(Failure::unreadable(
+            Diagnostic::error(
+                "C0008",
+                "--optimal and --what-if ask about the programmed feed: they do not go with --override",
+            )
+            .help("leave one of the two out"),
+        ));
+    }
     let machine = arguments.machine.load_to_run()?;
     let mut documents = Vec::new();
     let mut alarmed = false;
@@ -90,6 +102,7 @@ fn one(path: &Path, machine: &Loaded, arguments: &TimeArguments) -> Result<RunOu
     let options = RunOptions {
         machine,
         setup,
+        overrides: arguments.panel.overrides()?,
         drives: false,
         recording: None,
         mantissa_bits: None,

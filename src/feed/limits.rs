@@ -5,6 +5,7 @@
 //! `q''' v³ + 3 q'' v a + q' j`: for every axis the sums stay inside its limits wherever v, a and j stay inside those found here.
 //! Does not look at neighbours: what a junction allows is [`junction`](super::junction)'s.
 
+use super::feed_override::OVERRIDE_MAX_RATIO;
 use super::group::FeedGroup;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use super::ramp::Dynamics;
@@ -125,6 +126,17 @@ impl AxisRules {
         rules.jerk_limited = modes.acceleration_mode == AccelerationMode::Soft;
         rules.drive =
             (modes.acceleration_mode == AccelerationMode::Drive).then(|| rules.drive_rules(machine)).flatten();
+        rules
+    }
+
+    /// The same with this override on top of OVR; both together do no more than the control allows.
+    pub(super) fn overridden(&self, override_ratio: f64) -> Self {
+        let mut rules = self.clone();
+        rules.override_ratio = (rules.override_ratio * override_ratio).min(OVERRIDE_MAX_RATIO);
+        if let Some(drive) = &mut rules.drive {
+            drive.slow = drive.slow.overridden(override_ratio);
+            drive.weak = drive.weak.overridden(override_ratio);
+        }
         rules
     }
 

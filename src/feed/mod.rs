@@ -5,6 +5,7 @@
 
 mod blend_limits;
 mod continuous;
+mod feed_override;
 mod group;
 mod junction;
 mod limits;
@@ -18,11 +19,13 @@ mod published;
 pub mod ramp;
 mod rules;
 mod scan;
+mod spindle;
 mod split;
 mod varying;
 mod wire;
 mod worst;
 
+pub use feed_override::{OverrideChange, OverrideSchedule};
 pub use planner::Planner;
 pub use programmed::ProgrammedTime;
 pub use rules::{AxisCaps, PathRules, PieceRules};

@@ -45,6 +45,8 @@ pub enum LimitKind {
     Positioning,
     /// Feed override.
     Override,
+    /// Waiting for the spindle to come to its speed.
+    Spindle,
 }
 
 impl LimitKind {
@@ -65,6 +67,7 @@ impl LimitKind {
             Self::InPosition => "in_position",
             Self::Positioning => "positioning",
             Self::Override => "override",
+            Self::Spindle => "spindle",
         }
     }
 }
@@ -133,6 +136,12 @@ impl TimeLaw {
     /// Time from start to end of the piece.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
+    }
+
+    /// The phases up to a time.
+    pub(super) fn until(&self, time_s: f64) -> impl Iterator<Item = Phase> + '_ {
+        let begun = self.phases.iter().zip(&self.starts_s).take_while(move |(_, start_s)| **start_s < time_s);
+        begun.map(move |(phase, start_s)| Phase { duration_s: phase.duration_s.min(time_s - start_s), ..*phase })
     }
 
     /// State `time_s` after the start of the piece; clamped to its ends. A law without phases is at rest at 0.
@@ -217,6 +226,25 @@ pub struct PlannedPiece {
     pub buffered_blocks: u32,
     /// Axes that set out on their own when the piece begins; empty for most.
     pub positionings: Vec<AxisMotion>,
+    /// The feed override at its start, and its changes after that; empty where it is 100 % from end to end.
+    pub overrides: Vec<OverrideStep>,
+}
+
+/// The feed override from a time on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OverrideStep {
+    /// From the start of the piece.
+    pub from_s: f64,
+    /// 1: the programmed feed.
+    pub override_ratio: f64,
+}
+
+impl PlannedPiece {
+    /// The feed override `time_s` after the start of the piece.
+    pub fn override_ratio(&self, time_s: f64) -> f64 {
+        let before = self.overrides.iter().take_while(|step| step.from_s <= time_s);
+        before.last().map_or(1.0, |step| step.override_ratio)
+    }
 }
 
 /// A motion of one axis beside the path, final.

@@ -125,7 +125,7 @@ impl Interpolator {
                 active.carry_s + self.time_base.seconds((k - active.entry_k) * self.time_base.ticks_per_setpoint());
             let left_s = active.piece.law.duration_s() - time_s;
             if left_s > self.tolerance_s(k) {
-                return Some(self.setpoint(k, active, active.piece.law.at(time_s)));
+                return Some(self.setpoint(k, active, time_s));
             }
             // A next piece that begins up to the tolerance after the tick is only looked at, not begun; one that takes no time
             // (M30 at the end) does not ask for a cycle of its own.
@@ -134,13 +134,13 @@ impl Interpolator {
                 Some(piece) if left_s > 0.0 && !takes_no_time(&piece) => {
                     self.next = Some(piece);
                     let active = self.active.as_ref()?;
-                    return Some(self.setpoint(k, active, active.piece.law.at(time_s)));
+                    return Some(self.setpoint(k, active, time_s));
                 }
                 Some(piece) => self.begin(piece, k, -left_s),
                 None => {
                     self.ended = true;
                     let active = self.active.as_ref()?;
-                    return Some(self.setpoint(k, active, active.at_end()));
+                    return Some(self.setpoint_of(k, active, active.at_end(), active.piece.law.duration_s()));
                 }
             }
         }
@@ -207,7 +207,11 @@ impl Interpolator {
             Some(Active { piece, programmed_feed_lu_s, length_lu, rotary_only, entry_k: k, carry_s, path_length_mm });
     }
 
-    fn setpoint(&self, k: u64, active: &Active, state: PathState) -> Setpoint {
+    fn setpoint(&self, k: u64, active: &Active, time_s: f64) -> Setpoint {
+        self.setpoint_of(k, active, active.piece.law.at(time_s), time_s)
+    }
+
+    fn setpoint_of(&self, k: u64, active: &Active, state: PathState, time_s: f64) -> Setpoint {
         let s_lu = state.position_lu.clamp(0.0, active.length_lu);
         // A law that ends at rest may end a rounding error below it.
         let v = state.velocity_lu_s.max(0.0);
@@ -232,6 +236,7 @@ impl Interpolator {
                 path_length_mm: active.path_length_mm + linear_mm,
                 feed_lu_s: v,
                 programmed_feed_lu_s: active.programmed_feed_lu_s,
+                override_ratio: active.piece.override_ratio(time_s),
                 acceleration_lu_s2: a,
                 jerk_lu_s3: j,
                 limit: state.limit,

@@ -45,6 +45,8 @@ pub struct PathSample {
     pub feed_lu_s: f64,
     /// Programmed feed; `None` for rapids and standstill.
     pub programmed_feed_lu_s: Option<f64>,
+    /// Feed override at run time; 1: the programmed feed.
+    pub override_ratio: f64,
     /// Path acceleration.
     pub acceleration_lu_s2: f64,
     /// Path jerk.

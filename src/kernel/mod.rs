@@ -22,5 +22,5 @@ pub use follow::{FollowOptions, FollowOutcome, follow};
 pub use preparation::{Findings, PieceSource, Preparation};
 pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
 pub use setpoint_table::SetpointTable;
-pub use summary::{CornerSummary, RunSummary, Warning};
+pub use summary::{CornerSummary, OverrideSummary, RunSummary, Warning};
 pub use what_if::{Saving, WhatIf, what_if};

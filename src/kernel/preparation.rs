@@ -5,7 +5,7 @@
 //! it is planned to rest and handed out first, as on the control.
 
 use crate::base::{Diagnostic, TimeBase};
-use crate::feed::{PlannedPiece, Planner};
+use crate::feed::{OverrideSchedule, PlannedPiece, Planner};
 use crate::interpreter::{Interpreter, MainRun, Move, MoveKind, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
@@ -64,6 +64,11 @@ impl Preparation {
             stopped: false,
             moves: None,
         }
+    }
+
+    /// With changes of the feed override at run time.
+    pub fn with_overrides(self, schedule: &OverrideSchedule) -> Self {
+        Self { planner: self.planner.with_overrides(schedule), ..self }
     }
 
     /// Keeps the moves, for those who want to plan them again.

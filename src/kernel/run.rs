@@ -9,8 +9,9 @@ use super::record::{record_alarm, record_cycle};
 use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
 use crate::base::Diagnostic;
+use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
-use crate::machine::{Loaded, Machine, unsupported};
+use crate::machine::{Loaded, Machine, TimeLawKind, unsupported};
 use crate::program::ProgramId;
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
@@ -23,6 +24,8 @@ pub struct RunOptions<'a> {
     pub machine: &'a Loaded,
     /// The main program, and what lies around it.
     pub setup: Setup,
+    /// Changes of the feed override at run time.
+    pub overrides: OverrideSchedule,
     /// Simulate the drives; otherwise every axis is ideal.
     pub drives: bool,
     /// Where to record; `None`: figures only.
@@ -83,7 +86,10 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
     }
     let machine = Arc::new(options.machine.machine.clone());
     tracing::info!(program = options.setup.program.file_name(), machine = %machine.name, threads = options.threads, drives = options.drives, "run starts");
-    let preparation = Preparation::new(options.setup.clone(), &machine);
+    if !options.overrides.changes().is_empty() && machine.feed.time_law == TimeLawKind::SevenPhase {
+        return Err(RunError(override_refused()));
+    }
+    let preparation = Preparation::new(options.setup.clone(), &machine).with_overrides(&options.overrides);
     if options.threads > 1 {
         let source = PreparationThread::spawn(preparation)
             .map_err(|error| RunError(Diagnostic::error("K0001", format!("no thread for preparation: {error}"))))?;
@@ -91,6 +97,13 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
     } else {
         drive_loop(Kernel::with_source(machine, preparation, options.drives), options, progress)
     }
+}
+
+/// A law that begins and ends every piece without acceleration cannot change the feed inside one.
+fn override_refused() -> Diagnostic {
+    let message =
+        "--override needs the time law `continuous`: under `seven-phase` the feed cannot change inside a block";
+    Diagnostic::error("K0008", message).help("leave --override out, or run with --set feed.time_law=continuous")
 }
 
 fn drive_loop<S: PieceSource>(
@@ -167,6 +180,7 @@ fn conclude<S: PieceSource>(
         tracing::error!(code = alarm.code, line = alarm.line(), message = %alarm.message, "alarm");
     }
     let mut summary = RunSummary::new(&machine, options.setup.program.file_name(), kernel.figures(), options.drives);
+    summary.add_overrides(&options.overrides);
     summary.add_warnings(&warnings);
     if let Some(alarm) = &alarm {
         summary.set_alarm(alarm);

@@ -5,7 +5,7 @@
 
 use super::figures::{AxisFigures, Figures};
 use crate::base::{AxisId, AxisKind, Diagnostic, Severity, units};
-use crate::feed::Limit;
+use crate::feed::{Limit, OverrideChange, OverrideSchedule};
 use crate::machine::Machine;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -42,11 +42,23 @@ pub struct RunSummary {
     pub corners: Vec<CornerSummary>,
     /// Per axis, in the machine's order; rotary axes in deg.
     pub axes: Map<String, Value>,
+    /// Changes of the feed override at run time (`--override`), in order; left out without any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub overrides: Vec<OverrideSummary>,
     /// What a person should know.
     pub warnings: Vec<Warning>,
     /// The alarm that ended the program early.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alarm: Option<Warning>,
+}
+
+/// One change of the feed override.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct OverrideSummary {
+    /// As asked for; it acts from the first set-point at or after it.
+    pub time_s: f64,
+    /// Of the programmed feed.
+    pub override_percent: f64,
 }
 
 /// One blended corner.
@@ -122,9 +134,19 @@ impl RunSummary {
                 })
                 .collect(),
             axes,
+            overrides: Vec::new(),
             warnings: Vec::new(),
             alarm: None,
         }
+    }
+
+    /// Notes the changes of the feed override.
+    pub fn add_overrides(&mut self, schedule: &OverrideSchedule) {
+        let change = |change: &OverrideChange| OverrideSummary {
+            time_s: change.time_s,
+            override_percent: units::percent_from_ratio(change.override_ratio),
+        };
+        self.overrides.extend(schedule.changes().iter().map(change));
     }
 
     /// Adds findings: warnings and notes to `warnings`, errors too where they did not end the run.

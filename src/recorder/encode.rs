@@ -141,6 +141,7 @@ impl RunEncoder {
         path.programmed_feed_mm_min = sample.programmed_feed_lu_s.map(feed);
         path.acceleration_mm_s2 = Some(round(length(sample.acceleration_lu_s2)));
         path.jerk_mm_s3 = Some(round(length(sample.jerk_lu_s3)));
+        path.override_ratio = Some(round(sample.override_ratio));
         path.buffered_blocks = Some(sample.buffered_blocks);
         path.contour_error_mm = contour_error_mm.map(round);
         path.rotary_only = Some(sample.rotary_only);

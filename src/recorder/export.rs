@@ -230,6 +230,7 @@ impl Cells {
             Cell::Integer(path.buffered_blocks.map(u64::from)),
             Cell::Number(path.contour_error_mm),
             Cell::Integer(path.rotary_only.map(u64::from)),
+            Cell::Number(path.override_ratio),
         ];
         for cell in cells {
             self.text.push(b',');

@@ -79,7 +79,7 @@ pub const AXIS_FIELD_COUNT: usize = 23;
 pub const FLAGS_FIELD: usize = AXIS_FIELD_COUNT - 1;
 
 /// Fields of `sollwert.Path` in the order of the columns of an export.
-pub const PATH_FIELDS: [&str; 13] = [
+pub const PATH_FIELDS: [&str; 14] = [
     "program",
     "block",
     "line",
@@ -93,6 +93,7 @@ pub const PATH_FIELDS: [&str; 13] = [
     "buffered_blocks",
     "contour_error_mm",
     "rotary_only",
+    "override_ratio",
 ];
 
 /// Who makes a signal: decides which signals exist without drives, or on an axis whose drive the machine file does not describe.

@@ -10,7 +10,7 @@ mod test_machine;
 mod random;
 pub use random::Random;
 use sollwert::base::{AxisId, PartPoint, PerAxis, TimeBase};
-use sollwert::feed::{PlannedPiece, Planner};
+use sollwert::feed::{OverrideSchedule, PlannedPiece, Planner};
 use sollwert::interpolator::{Interpolator, Setpoint};
 use sollwert::interpreter::{ArcGeometry, Feed, Modes, Move, MoveKind};
 use sollwert::kinematics::{JointPath, Kinematics};
@@ -131,7 +131,15 @@ impl Program {
 }
 
 pub fn plan(machine: &Machine, paths: Vec<JointPath>) -> Vec<PlannedPiece> {
-    let mut planner = Planner::new(machine);
+    plan_with(Planner::new(machine), paths)
+}
+
+/// With changes of the feed override, as `--override` takes them.
+pub fn plan_under(machine: &Machine, overrides: &str, paths: Vec<JointPath>) -> Vec<PlannedPiece> {
+    plan_with(Planner::new(machine).with_overrides(&OverrideSchedule::parse(overrides).unwrap()), paths)
+}
+
+fn plan_with(mut planner: Planner, paths: Vec<JointPath>) -> Vec<PlannedPiece> {
     let mut paths = paths.into_iter();
     let mut planned = Vec::new();
     loop {

@@ -22,6 +22,9 @@ const LOOKS: usize = 16;
 /// A path that goes through a programmed point: points of arcs are rounded to 1e-6 mm.
 const MET_LU: f64 = 3e-6;
 
+/// Steps of the direction below this are rounding.
+const TURN_MIN: f64 = 1e-6;
+
 /// What a programmed point may be missed by.
 #[derive(Clone, Copy, Debug)]
 struct Tolerance {
@@ -165,6 +168,11 @@ pub fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Fi
         let (from, to) = (places[k - 1].0, places[k].0);
         let rests = (from..to).find(|n| run.joints[*n].rests);
         let Some(point) = rests.map(|n| run.stretches[n + 1].at) else { continue };
+        // A corner on the way (G64): beyond it an axis may still be fast.
+        if run.joints[from..to].iter().any(|joint| !joint.rests && joint.turn.iter().any(|turn| turn.abs() > TURN_MIN))
+        {
+            continue;
+        }
         for row in [&run.rows[k - 1], &run.rows[k]] {
             let text = format!("exact stop before line {}, distance of a set-point", run.rows[k].line);
             let found = far(machine, run, &row.q, &point, &text);

@@ -4,7 +4,7 @@ use crate::run::{Run, places};
 use crate::settings::{Law, Settings};
 use crate::verdict::Kind;
 use crate::{axes, case, contour};
-use sollwert::machine::Machine;
+use sollwert::machine::{AccelerationMode, Machine};
 use std::collections::BTreeSet;
 use std::sync::{Arc, LazyLock};
 
@@ -101,4 +101,22 @@ fn tolerances_feeds_ends_and_rests() {
         run.rows[middle].q[0] += 1e-7;
     });
     assert_eq!(count(&moved, Kind::Path), moved.len());
+}
+
+#[test]
+fn jerk_without_limit_and_acceleration_at_high_speed() {
+    let soft = seen(|_, run| {
+        run.targets.iter_mut().for_each(|target| target.modes.acceleration_mode = AccelerationMode::Soft);
+    });
+    assert!(count(&soft, Kind::Jerk) >= 4, "{soft:?}");
+    let reduced = seen(|machine, run| {
+        let drive = |target: &crate::run::Target| target.modes.acceleration_mode == AccelerationMode::Drive;
+        if run.targets.iter().any(drive) {
+            for axis in &mut machine.axes {
+                axis.acceleration_reduction.reduction_ratio = 0.95;
+                axis.acceleration_reduction.velocity_ratio *= 0.5;
+            }
+        }
+    });
+    assert!(count(&reduced, Kind::Acceleration) >= 1, "{reduced:?}");
 }

@@ -15,6 +15,8 @@
 mod axes;
 mod contour;
 mod faults;
+#[cfg(feature = "optimal")]
+mod optimum;
 mod program;
 #[path = "../random/mod.rs"]
 mod random;
@@ -233,3 +235,29 @@ fn known(finding: &Finding) -> bool {
         _ => false,
     }
 }
+
+/// `continuous` within 5 % of the optimum: in the nightly run on 100 paths, in the ordinary one on few, because the optimum takes its time.
+#[cfg(feature = "optimal")]
+#[test]
+fn near_the_optimum() {
+    let (first, count) = (number("PROOF_FIRST", 0), number("PROOF_PROGRAMS", 3).min(100));
+    let mut losses: Vec<(f64, u64)> = Vec::new();
+    let mut unsolved = Vec::new();
+    for seed in first..first + count {
+        match optimum::times(seed) {
+            Ok(times) => losses.push((times.control_s / times.optimum_s - 1.0, seed)),
+            Err(text) => unsolved.push((seed, text)),
+        }
+    }
+    losses.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (loss, seed) in &losses {
+        println!("seed {seed}: {:+.2} % of the optimum", 100.0 * loss);
+    }
+    println!("no optimum: {unsolved:?}");
+    let far = losses.iter().filter(|(loss, _)| *loss > LOSS_MAX_RATIO).count();
+    assert!(far == 0, "{far} of {count} programs take more than 5 % above the optimum: see above");
+}
+
+/// What `continuous` may take above the optimum.
+#[cfg(feature = "optimal")]
+const LOSS_MAX_RATIO: f64 = 0.05;

@@ -304,6 +304,9 @@ pub fn places(run: &Run) -> Result<Vec<(usize, f64)>, String> {
     Ok(places)
 }
 
+/// Places from which the foot of a set-point is looked for.
+const STARTS: usize = 4;
+
 /// What a set-point may be off the path at its own path length: lengths are sums of thousands of pieces.
 const ON_PATH_LU: f64 = 2e-8;
 
@@ -320,17 +323,23 @@ impl Stretch {
     }
 
     /// Place whose tangent is square to the way to `q`, over the rotary axes: rows say nothing about their path length. They have unit
-    /// speed, so that what is left along the tangent is what is left of the way.
+    /// speed, so that what is left along the tangent is what is left of the way. Where the axes turn back there are several such places.
     fn foot(&self, path: &JointPath, q: &Posture) -> f64 {
+        let off = |s_lu: &f64| distance(&posture(&path.at(*s_lu).position.0), q);
+        let feet = (0..=STARTS).map(|n| self.foot_from(path, q, self.length_lu * n as f64 / STARTS as f64));
+        feet.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0.0)
+    }
+
+    fn foot_from(&self, path: &JointPath, q: &Posture, start_lu: f64) -> f64 {
         let Some(curve) = path.contour.curve() else { return 0.0 };
-        let mut s_lu = 0.0;
+        let mut s_lu = start_lu;
         for _ in 0..50 {
             let state = curve.at(s_lu);
             let (position, first) = (posture(&state.position.0), posture(&state.first));
             // What does not count as path does not move, but for rounding; through a transformation it is elsewhere.
             let counts = |i: &usize| first[*i].abs() > 1e-9;
             let left: f64 = (0..5).filter(counts).map(|i| (q[i] - position[i]) * first[i]).sum();
-            s_lu = (s_lu + left / first.iter().map(|x| x * x).sum::<f64>()).clamp(-1.0, self.length_lu + 1.0);
+            s_lu = (s_lu + left / first.iter().map(|x| x * x).sum::<f64>()).clamp(0.0, self.length_lu);
             if left.abs() < 1e-13 {
                 break;
             }

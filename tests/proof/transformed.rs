@@ -69,7 +69,7 @@ fn transformed(machine: &Machine, text: &str) -> Result<Run, String> {
     Ok(Run { rows, targets, stretches, joints, summary: None, t_s })
 }
 
-fn planned(machine: &Machine, paths: Vec<JointPath>) -> Result<Vec<PlannedPiece>, String> {
+pub fn planned(machine: &Machine, paths: Vec<JointPath>) -> Result<Vec<PlannedPiece>, String> {
     let mut planner = Planner::new(machine);
     let mut planned = Vec::new();
     for path in paths {

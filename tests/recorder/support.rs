@@ -101,6 +101,7 @@ pub fn path_sample(tick: Tick) -> PathSample {
         path_length_mm: k as f64 * 0.1,
         feed_lu_s: 50.0,
         programmed_feed_lu_s: (!rapid).then_some(60.0),
+        override_ratio: 1.0 + (k % 3) as f64 / 4.0,
         acceleration_lu_s2: 1.0 / 3.0,
         jerk_lu_s3: -2.0,
         limit: Limit { kind: LimitKind::Jerk, axis: k.is_multiple_of(2).then(|| AxisId::new(2)) },

@@ -43,6 +43,8 @@ pub(super) struct Chain {
     pub intervals: Vec<Interval>,
     /// Highest b at the start of each interval, from junctions; infinite where there is none.
     pub junctions: Vec<Junction>,
+    /// Lowest b at the first borders; there may be none at all.
+    pub floors_lu2_s2: Vec<f64>,
 }
 
 /// What a border between pieces allows.
@@ -79,6 +81,10 @@ const ATTEMPTS_MAX: u32 = 8;
 /// By how much limits give way, of what planning does not use of them anyway.
 const LOOSER_RATIOS: [f64; 3] = [0.0, 2e-4, 1.5e-3];
 
+/// Steps of the solver after which a problem counts as unsolvable.
+const STEPS_MAX: u32 = 80;
+const HURRIED_STEPS_MAX: u32 = 40;
+
 /// Share of the estimate to begin with.
 const START_RATIO: f64 = 0.95;
 
@@ -90,6 +96,8 @@ pub(super) type Look<'a> = dyn Fn(usize, f64) -> Derivatives + 'a;
 pub(super) struct Planning {
     problem: Problem,
     solver: Solver,
+    /// Whether there is a profile is to be found out quickly: what is found only with effort counts as none.
+    pub hurries: bool,
     /// b̂ at the borders.
     estimate: Vec<f64>,
     caps: Vec<f64>,
@@ -220,8 +228,10 @@ impl Planning {
         }
         problem.costs_ratio.iter_mut().for_each(|cost| *cost /= total);
         for k in 0..=count {
+            let floor = |k: usize| chain.floors_lu2_s2.get(first + k).copied().unwrap_or(0.0);
             let mut node = NodeRows {
                 problem,
+                floors_lu2_s2: [floor(k), floor(k + 1)],
                 scale: scale(k),
                 fixed: k == 0 && start != Start::Rest,
                 estimate_lu2_s2: estimate[k],
@@ -247,13 +257,18 @@ impl Planning {
     /// Solves the problem around the estimate. From a state that uses its limits to the full nothing may be possible but for rounding: the reserve
     /// gives way a little.
     fn solve(&mut self, chain: &Chain, start: Start, range: &std::ops::Range<usize>) -> bool {
-        let looser: &[f64] = if start == Start::Rest { &[0.0] } else { &LOOSER_RATIOS };
+        let looser = match start {
+            Start::Rest => &LOOSER_RATIOS[..1],
+            Start::At(_) if self.hurries => &LOOSER_RATIOS[2..],
+            Start::At(_) => &LOOSER_RATIOS,
+        };
+        let steps_max = if self.hurries { HURRIED_STEPS_MAX } else { STEPS_MAX };
         looser.iter().any(|by_ratio| {
             self.pose(chain, start);
             self.start_solver(chain, range);
             self.fix_start(chain, start);
             self.problem.loosen(*by_ratio);
-            self.solver.solve(&mut self.problem, GAP_MAX_RATIO) == Outcome::Solved
+            self.solver.solve(&mut self.problem, GAP_MAX_RATIO, steps_max) == Outcome::Solved
         })
     }
 

@@ -35,6 +35,12 @@ const INTERVALS_MAX: usize = 20_000;
 /// The interval at a rest is at most this share of its piece.
 const REST_SHARE: f64 = 0.15;
 
+/// Intervals are short up to this share beyond the way that a change is expected to take.
+const SETTLED_SHARE: f64 = 0.3;
+
+/// There an interval takes this share of the usual time.
+const SETTLING_STEP_RATIO: f64 = 0.5;
+
 /// Beside a knot of a spline its derivatives are taken this share of the range inside.
 const BESIDE_RATIO: f64 = 1e-9;
 
@@ -57,13 +63,60 @@ pub(super) enum End {
     Speed(f64),
 }
 
+/// What of a piece is cut.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// From the start of the piece.
+    pub from_lu: f64,
+    pub to_lu: f64,
+    pub ends: [End; 2],
+    /// At its start the speed still changes.
+    pub settling: Settling,
+}
+
+/// A change of the speed at the start of a stretch, whatever its ends allow.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Settling {
+    /// The way that it takes, about; 0: there is none.
+    pub way_lu: f64,
+    /// The speed that it begins with.
+    pub speed_lu_s: f64,
+}
+
+impl Settling {
+    /// No more than the speed on the way down, some way after its start; `None` well beyond its end.
+    pub fn speed_at(&self, way_lu: f64) -> Option<f64> {
+        let left_share = 1.0 - way_lu / self.way_lu;
+        (left_share > -SETTLED_SHARE).then(|| self.speed_lu_s * left_share.max(0.0))
+    }
+
+    /// What is left of it some way after its start.
+    pub fn after(&self, way_lu: f64) -> Self {
+        match self.speed_at(way_lu) {
+            Some(speed_lu_s) if speed_lu_s > 0.0 => Self { way_lu: self.way_lu - way_lu, speed_lu_s },
+            _ => Self::default(),
+        }
+    }
+}
+
+impl Stretch {
+    /// All of a piece.
+    pub fn whole(path: &JointPath, ends: [End; 2]) -> Self {
+        Self { from_lu: 0.0, to_lu: path.length_lu(), ends, settling: Settling::default() }
+    }
+
+    fn length_lu(&self) -> f64 {
+        self.to_lu - self.from_lu
+    }
+}
+
 /// Limits and curve of a piece while it is cut.
 struct Cutter<'a> {
     rules: &'a AxisRules,
     path: &'a JointPath,
     blend: bool,
-    length_lu: f64,
-    ends: [End; 2],
+    /// What is cut.
+    stretch: Stretch,
     /// A straight piece has the same derivatives everywhere.
     straight: Option<Derivatives>,
     bounds: Arc<Bounds>,
@@ -73,9 +126,9 @@ struct Cutter<'a> {
 }
 
 impl Grid {
-    /// Cuts `path`, which moves and has no step of direction or curvature inside.
-    pub fn new(rules: &AxisRules, path: &JointPath, blend: bool, ends: [End; 2]) -> Self {
-        Cutter::new(throughout(rules, path), path, blend, ends).cut()
+    /// Cuts a stretch of `path`, which moves and has no step of direction or curvature inside.
+    pub fn new(rules: &AxisRules, path: &JointPath, blend: bool, stretch: Stretch) -> Self {
+        Cutter::new(throughout(rules, path), path, blend, stretch).cut()
     }
 }
 
@@ -120,9 +173,9 @@ pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
 }
 
 impl<'a> Cutter<'a> {
-    fn new(rules: &'a AxisRules, path: &'a JointPath, blend: bool, ends: [End; 2]) -> Self {
-        let length_lu = path.length_lu();
-        let start = Derivatives::from(path.at(0.0));
+    fn new(rules: &'a AxisRules, path: &'a JointPath, blend: bool, stretch: Stretch) -> Self {
+        let length_lu = stretch.length_lu();
+        let start = Derivatives::from(path.at(stretch.from_lu));
         let straight = path.is_straight().then_some(start);
         let tangent = Tangent::new(rules, blend, &start.first);
         // From rest to rest in four phases of constant jerk, or in two of constant acceleration: the least that the piece can take.
@@ -131,14 +184,13 @@ impl<'a> Cutter<'a> {
         } else {
             2.0 * (length_lu / tangent.acceleration_lu_s2).sqrt()
         };
-        let rests = ends.contains(&End::Rest);
+        let rests = stretch.ends.contains(&End::Rest);
         let step_max_s = if rests { STEP_MAX_S.min(SHORT_STEP_SHARE * alone_s) } else { STEP_MAX_S };
         Self {
             rules,
             path,
             blend,
-            length_lu,
-            ends,
+            stretch,
             straight,
             bounds: Arc::new(Bounds::new(rules, blend)),
             tangent: Tangent { step_s: tangent.step_s.min(step_max_s), ..tangent },
@@ -148,12 +200,13 @@ impl<'a> Cutter<'a> {
     }
 
     fn cut(mut self) -> Grid {
-        let mut borders = vec![0.0];
-        let rests = self.ends.map(|end| end == End::Rest);
+        let Stretch { from_lu, to_lu, ends, .. } = self.stretch;
+        let mut borders = vec![from_lu];
+        let rests = ends.map(|end| end == End::Rest);
         if rests[0] {
-            borders.push(self.rest_lu());
+            borders.push(from_lu + self.rest_lu());
         }
-        let inside = [borders[borders.len() - 1], self.length_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
+        let inside = [borders[borders.len() - 1], to_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
         let knots: Vec<f64> = match self.path.contour.curve() {
             Some(Curve::Polynomial(curve)) if self.path.is_contour() => curve.knots_lu().collect(),
             _ if self.path.is_contour() => Vec::new(),
@@ -161,15 +214,15 @@ impl<'a> Cutter<'a> {
         };
         borders.extend(knots.into_iter().filter(|s_lu| *s_lu > inside[0] && *s_lu < inside[1]));
         if rests[1] {
-            borders.push(self.length_lu - self.rest_lu());
+            borders.push(to_lu - self.rest_lu());
         }
-        borders.push(self.length_lu);
+        borders.push(to_lu);
         for range in borders.windows(2) {
             self.cut_range(range[0], range[1]);
         }
         self.drop_idle_axes();
-        let half_lu = 0.5 * self.length_lu;
-        let v = self.ends.iter().fold(self.top_lu_s, |v, end| v.min(self.reached_lu_s(*end, half_lu)));
+        let half_lu = 0.5 * self.stretch.length_lu();
+        let v = ends.iter().fold(self.top_lu_s, |v, end| v.min(self.reached_lu_s(*end, half_lu)));
         let stop_lu = self.tangent.stop_lu(v);
         Grid { intervals: self.intervals, rests, stop_lu }
     }
@@ -178,15 +231,16 @@ impl<'a> Cutter<'a> {
     fn rest_lu(&self) -> f64 {
         let Tangent { acceleration_lu_s2, jerk_lu_s3, step_s: t, jerk_limited } = self.tangent;
         let lu = if jerk_limited { jerk_lu_s3 * t.powi(3) / 6.0 } else { acceleration_lu_s2 * t * t / 2.0 };
-        lu.min(REST_SHARE * self.length_lu)
+        lu.min(REST_SHARE * self.stretch.length_lu())
     }
 
     fn cut_range(&mut self, start_lu: f64, end_lu: f64) {
         let inside = BESIDE_RATIO * (end_lu - start_lu);
         let at_start = self.look(if start_lu > 0.0 { start_lu + inside } else { 0.0 });
-        let at_end = self.look(if end_lu < self.length_lu { end_lu - inside } else { end_lu });
-        let rest = (self.ends[0] == End::Rest && start_lu == 0.0)
-            || (self.ends[1] == End::Rest && end_lu == self.length_lu && start_lu > 0.0);
+        let at_end = self.look(if end_lu < self.path.length_lu() { end_lu - inside } else { end_lu });
+        let Stretch { from_lu, to_lu, ends, .. } = self.stretch;
+        let rest = (ends[0] == End::Rest && start_lu == from_lu)
+            || (ends[1] == End::Rest && end_lu == to_lu && start_lu > from_lu);
         let mut from = (start_lu, at_start);
         let mut waiting = vec![((end_lu, at_end), 0)];
         let cuts_min = self.cuts_min();
@@ -233,12 +287,12 @@ impl<'a> Cutter<'a> {
     fn quick(&self, start_lu: f64, end_lu: f64, middle: &Derivatives) -> bool {
         let middle_lu = 0.5 * (start_lu + end_lu);
         let held_lu_s = constant_speed_lu_s(self.rules, self.path, middle);
-        let distances = [middle_lu, self.length_lu - middle_lu];
+        let distances = [middle_lu - self.stretch.from_lu, self.stretch.to_lu - middle_lu];
         let mut speed_lu_s = held_lu_s;
         let half_lu = 0.5 * (end_lu - start_lu);
         let mut near_s = f64::INFINITY;
         let mut ramp_s = 0.0_f64;
-        for (end, distance_lu) in self.ends.iter().zip(distances) {
+        for (end, distance_lu) in self.stretch.ends.iter().zip(distances) {
             let reached_lu_s = self.reached_lu_s(*end, distance_lu);
             let nearer_lu_s = self.reached_lu_s(*end, distance_lu - half_lu);
             let further_lu_s = self.reached_lu_s(*end, distance_lu + half_lu).min(held_lu_s);
@@ -251,8 +305,12 @@ impl<'a> Cutter<'a> {
             let phase_s = self.tangent.step_s / STEP_SHARE;
             ramp_s = ramp_s.max((held_lu_s - from_lu_s) / self.tangent.acceleration_lu_s2 + phase_s);
         }
-        let away_s = GROWTH_SHARE * (near_s - ramp_s).max(0.0);
-        end_lu - start_lu <= speed_lu_s * self.tangent.step_s.max(away_s)
+        let mut away_s = GROWTH_SHARE * (near_s - ramp_s).max(0.0);
+        let mut step_s = self.tangent.step_s;
+        if let Some(settling_lu_s) = self.stretch.settling.speed_at(distances[0]) {
+            (speed_lu_s, step_s, away_s) = (speed_lu_s.max(settling_lu_s), SETTLING_STEP_RATIO * step_s, 0.0);
+        }
+        end_lu - start_lu <= speed_lu_s * step_s.max(away_s)
     }
 
     /// About the speed that is reached at a distance from an end.

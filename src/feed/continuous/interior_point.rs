@@ -149,9 +149,6 @@ pub(super) struct Solver {
     nodes: Vec<Node>,
 }
 
-/// Steps after which a problem counts as unsolvable.
-const STEPS_MAX: u32 = 80;
-
 /// How much of the way to the nearest limit a step goes.
 const STEP_SHARE: f64 = 0.99;
 
@@ -191,15 +188,15 @@ impl Solver {
         }
     }
 
-    /// Solves to a cost within `gap_max_ratio` of the least, absolute.
-    pub fn solve(&mut self, problem: &mut Problem, gap_max_ratio: f64) -> Outcome {
+    /// Solves to a cost within `gap_max_ratio` of the least, absolute, in `steps_max` steps.
+    pub fn solve(&mut self, problem: &mut Problem, gap_max_ratio: f64, steps_max: u32) -> Outcome {
         if self.nodes.len() != problem.transitions.len() + 1 || problem.rows.is_empty() {
             return Outcome::Failed;
         }
         let count = problem.rows.len() as f64;
         self.first_slacks(problem, count);
         let (mut stalls, mut step) = (0, 0.0);
-        for _ in 0..STEPS_MAX {
+        for _ in 0..steps_max {
             let (gap, residual) = self.advance(problem, step);
             if !gap.is_finite() {
                 return Outcome::Failed;

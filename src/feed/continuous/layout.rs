@@ -7,6 +7,7 @@
 use super::Piece;
 use super::chain::{Chain, Junction};
 use super::group::Stretch;
+use super::interval::Interval;
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -21,8 +22,18 @@ pub(super) struct Place {
     pub part_lu: Option<[f64; 2]>,
 }
 
+impl Place {
+    /// Way of the piece, of its plan at least.
+    pub fn way_lu(&self, chain: &Chain) -> f64 {
+        match self.part_lu {
+            Some([from_lu, to_lu]) => to_lu - from_lu,
+            None => chain.intervals[self.intervals.clone()].iter().map(Interval::length_lu).sum(),
+        }
+    }
+}
+
 /// A chain and what its intervals belong to.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     pub chain: Chain,
     pub places: VecDeque<Place>,
@@ -78,6 +89,39 @@ impl Layout {
             }
         }
         self.uncut = self.uncut.min(self.chain.intervals.len());
+    }
+
+    /// The plan begins inside a piece: what its start allows is no matter.
+    pub fn frees_start(&mut self) {
+        if let Some(junction) = self.chain.junctions.first_mut() {
+            junction.speed_squared_lu2_s2 = f64::INFINITY;
+        }
+    }
+
+    /// Cuts an interval in two, `way_lu` from its start; not if pieces share it.
+    pub fn split(&mut self, index: usize, way_lu: f64, pieces: &[Piece<'_>]) {
+        if self.places.iter().any(|place| place.part_lu.is_some() && place.intervals.start == index) {
+            return;
+        }
+        let interval = &self.chain.intervals[index];
+        let path = pieces[self.owners[index]].path;
+        let border_lu = interval.start_lu + way_lu;
+        let parts = [(interval.start_lu, border_lu), (border_lu, interval.end_lu)];
+        let [before, after] = parts.map(|(from_lu, to_lu)| interval.part(path, from_lu, to_lu));
+        let free = Junction { speed_squared_lu2_s2: f64::INFINITY, limit: before.cap.limit };
+        self.chain.intervals[index] = before;
+        self.chain.intervals.insert(index + 1, after);
+        self.chain.junctions.insert(index + 1, free);
+        let floors = &mut self.chain.floors_lu2_s2;
+        if let [from, to, ..] = floors[index.min(floors.len())..] {
+            floors.insert(index + 1, from.min(to));
+        }
+        self.owners.insert(index + 1, self.owners[index]);
+        for Place { intervals, .. } in &mut self.places {
+            intervals.start += usize::from(intervals.start > index);
+            intervals.end += usize::from(intervals.end > index);
+        }
+        self.uncut += usize::from(self.uncut > index);
     }
 
     /// Appends the grid of a piece; where the plan begins or ends at rest there and the grid was not made for it, the first or last interval is cut.

@@ -4,9 +4,12 @@
 //! fastest profile is planned that ends at rest inside the window (`chain`); as much of it is kept as the stop at its end does not touch,
 //! and handed out piece by piece, so that a plan serves many pieces when the window is long. A plan that cannot be made, or does not keep every
 //! limit, is not taken: the path goes on as planned before, to the stop at its end, which is why there is always a way to stop.
+//! A change of the feed override while the front piece moves is a new plan from where it is (`change`).
 //! Does not know what a block is.
 
+mod along;
 mod chain;
+mod change;
 mod estimate;
 mod grid;
 mod group;
@@ -16,17 +19,21 @@ mod interior_point;
 mod law;
 mod layout;
 mod refuge;
+mod regime;
 mod rows;
 
 use super::limits::AxisRules;
 use super::profile::SpeedCap;
 use super::{Limit, LimitKind, TimeLaw};
+use crate::interpreter::Feed;
 use crate::kinematics::{JointPath, JointState};
-use chain::{Chain, Look, PathPoint, Planning, Profile, Start};
+use chain::{Chain, PathPoint, Planning, Profile, Start};
+pub(super) use change::Change;
 use grid::{End, Grid, throughout};
 use group::{Brief, Stretch};
 use interval::{Derivatives, Tangent};
 use layout::{Layout, Place};
+use regime::Regime;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -48,7 +55,11 @@ const SAME_PLACE_RATIO: f64 = 1e-9;
 /// A piece that moves, as this law sees it.
 #[derive(Clone, Debug)]
 pub(super) struct Flow {
+    /// Those of its modes.
+    programmed: Arc<AxisRules>,
+    /// The same under the override that it was looked at with last.
     rules: Arc<AxisRules>,
+    override_ratio: f64,
     blend: bool,
     /// About the highest speeds at its ends.
     ends_lu_s: [f64; 2],
@@ -66,6 +77,13 @@ pub(super) struct Piece<'a> {
     pub junction: SpeedCap,
     /// The path rests at its end.
     pub rests_after: bool,
+}
+
+impl Piece<'_> {
+    /// The feed override leaves it alone.
+    fn is_rapid(&self) -> bool {
+        self.path.contour.feed == Feed::Rapid
+    }
 }
 
 /// Plans and hands out.
@@ -87,6 +105,8 @@ pub(super) struct Continuous {
     disturbed: usize,
     /// The law of the front piece where there is no plan for it.
     refuge: Option<TimeLaw>,
+    /// The feed override, and where the front piece stands under it.
+    regime: Regime,
 }
 
 impl Flow {
@@ -99,12 +119,19 @@ impl Flow {
             Some(brief) => [brief.speed_lu_s; 2],
             None => grid::end_speeds_lu_s(&rules, path),
         };
-        Self { rules, blend, ends_lu_s, tangent, brief, grid: None }
+        Self { programmed: rules.clone(), rules, override_ratio: 1.0, blend, ends_lu_s, tangent, brief, grid: None }
     }
 
     /// Highest constant speeds at its ends; not positive or no number: nothing can move there.
     pub fn ends_lu_s(&self) -> [f64; 2] {
         self.ends_lu_s
+    }
+
+    /// The same under other rules.
+    fn follow(&mut self, rules: Arc<AxisRules>, path: &JointPath) {
+        let ends = [path.at(0.0), path.at(path.length_lu())];
+        let new = Self::new(rules, path, self.blend, ends.each_ref());
+        *self = Self { programmed: self.programmed.clone(), override_ratio: self.override_ratio, ..new };
     }
 
     /// The way that a stop from its highest speed takes, about.
@@ -122,44 +149,64 @@ impl Continuous {
 
     /// Plans again from the start of the front piece. `pieces`: the window in order, without what does not move, up to a rest at most.
     pub fn plan(&mut self, pieces: &mut [Piece<'_>]) {
+        let pieces = self.regime.allowed(pieces);
+        if self.lay(pieces) {
+            return;
+        }
+        // What was planned before still stands, to its end.
+        self.kept = self.chain.intervals.len();
+        if self.places.is_empty() {
+            self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
+        }
+    }
+
+    /// A new plan, if there is one.
+    fn lay(&mut self, pieces: &mut [Piece<'_>]) -> bool {
         let start = self.start();
         let known = self.known().min(pieces.len().saturating_sub(1));
-        let count = reach(pieces, known, start);
+        let count = self.reach(pieces, known, start);
         let pieces = &mut pieces[..count];
-        let entry_lu2_s2 = match self.places.get(known) {
-            Some(place) => self.profile.points[place.intervals.start].speed_squared_lu2_s2,
-            None => self.profile.points.get(self.first).map_or(0.0, |point| point.speed_squared_lu2_s2),
+        let mut layout = self.layout(pieces, known, start);
+        if self.regime.settling_lu > 0.0 {
+            self.settle(&mut layout, pieces, self.regime.settling_lu);
+        }
+        let Some(profile) = self.attempt(&mut layout, pieces, start) else { return false };
+        let rests = pieces.last().is_some_and(|last| last.rests_after);
+        self.adopt(layout, profile, rests);
+        true
+    }
+
+    /// The chain of these pieces; the first `known` ones have their places already.
+    fn layout(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> Layout {
+        let entry_lu2_s2 = match (start, self.places.get(known)) {
+            (Start::At(point), _) if known == 0 => point.speed_squared_lu2_s2,
+            (_, Some(place)) => self.profile.points[place.intervals.start].speed_squared_lu2_s2,
+            (_, None) => self.profile.points.get(self.first).map_or(0.0, |point| point.speed_squared_lu2_s2),
         };
         let speeds_lu_s = group::border_speeds(pieces, known, entry_lu2_s2.sqrt());
-        let stretches = group::stretches(pieces, known, &speeds_lu_s, start == Start::Rest);
+        let cut_first = start == Start::Rest || self.regime.from_lu > 0.0;
+        let stretches = group::stretches(pieces, known, &speeds_lu_s, cut_first);
         let mut first = known;
         for stretch in &stretches {
             if let Stretch::Cut = stretch {
-                cut_piece(pieces, first, start);
+                self.cut_piece(pieces, first, start);
             }
             first += stretch.pieces();
         }
-        let pieces = &*pieces;
-        let Some(last) = pieces.last() else { return };
-        let rests = last.rests_after;
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
         layout.extend(pieces, known, stretches, start == Start::Rest);
-        let Layout { mut chain, places, owners, uncut } = layout;
-        let look = |index: usize, s_lu: f64| {
-            let paths = pieces[owners[index]..].iter().map(|piece| piece.path);
-            let place = group::place(paths, s_lu).unwrap_or((pieces[owners[index]].path, s_lu));
-            Derivatives::from(place.0.at(place.1))
-        };
-        let Some(profile) = self.attempt(&mut chain, start, &look) else {
-            // What was planned before still stands, to its end.
-            self.kept = self.chain.intervals.len();
-            if self.places.is_empty() {
-                self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
-            }
-            return;
-        };
+        if self.regime.from_lu > 0.0 && known == 0 {
+            layout.frees_start();
+        }
+        layout
+    }
+
+    /// Takes a plan over.
+    fn adopt(&mut self, layout: Layout, profile: Profile, rests: bool) {
+        let Layout { chain, places, uncut, .. } = layout;
         (self.chain, self.profile, self.places) = (chain, profile, places);
         (self.first, self.uncut) = (0, uncut);
+        self.regime.point = None;
         self.keep(rests);
     }
 
@@ -176,20 +223,22 @@ impl Continuous {
 
     /// A profile for `chain`. What is left of the plan before is a way that keeps every limit; where it does not brake for its own end it is about the
     /// fastest as well.
-    fn attempt(&mut self, chain: &mut Chain, start: Start, look: &Look<'_>) -> Option<Profile> {
+    fn attempt(&mut self, layout: &mut Layout, pieces: &[Piece<'_>], start: Start) -> Option<Profile> {
+        let Layout { chain, owners, .. } = layout;
         let (points, fast) = self.hints(chain);
-        let planned = self.planning.plan(chain, start, &points[..fast], look);
+        let look = look(pieces, owners);
+        let planned = self.planning.plan(chain, start, &points[..fast], &look);
         if planned.is_some() || points.len() <= fast {
             return planned;
         }
-        self.planning.plan(chain, start, &points, look)
+        self.planning.plan(chain, start, &points, &look)
     }
 
     /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
     fn hints(&self, chain: &Chain) -> (Vec<PathPoint>, usize) {
         let end = self.uncut.max(self.first);
         let (mut points, mut fast) = (Vec::with_capacity(chain.intervals.len()), 0);
-        let (mut index, mut way_lu) = (self.first, 0.0);
+        let (mut index, mut way_lu) = (self.first, self.offset_lu());
         for interval in &chain.intervals {
             while index < end && way_lu >= self.chain.intervals[index].length_lu() * (1.0 - SAME_PLACE_RATIO) {
                 way_lu -= self.chain.intervals[index].length_lu();
@@ -212,23 +261,32 @@ impl Continuous {
         (points, fast)
     }
 
-    /// The law of the front piece, which is handed out.
-    pub fn take_front(&mut self) -> Option<TimeLaw> {
-        if let Some(law) = self.refuge.take() {
-            return Some(law);
+    /// The law of the front piece from where it stands, up to its end or to a stop inside.
+    pub fn front_law(&self) -> Option<TimeLaw> {
+        if let Some(law) = &self.refuge {
+            return Some(law.clone());
         }
-        let place = self.places.pop_front()?;
-        self.first = self.places.front().map_or(place.intervals.end, |next| next.intervals.start);
         let limit = |index| {
             let limit = self.profile.limit(&self.chain, index);
             let felt = index >= self.braking || (index >= self.disturbed && limit.axis.is_some());
             if felt { Limit { kind: LimitKind::LookAhead, axis: None } } else { limit }
         };
-        Some(law::law(&self.chain, &self.profile, &place, limit))
+        Some(law::law(&self.chain, &self.profile, self.places.front()?, limit))
+    }
+
+    /// The front piece is handed out, or has come to rest inside at this place.
+    pub fn pass_front(&mut self, rest_lu: Option<f64>) {
+        if self.refuge.take().is_none()
+            && let Some(place) = self.places.pop_front()
+        {
+            self.regime.settling_lu -= place.way_lu(&self.chain);
+            self.first = self.places.front().map_or(place.intervals.end, |next| next.intervals.start);
+        }
+        (self.regime.from_lu, self.regime.point) = (rest_lu.unwrap_or(0.0), None);
     }
 
     fn start(&self) -> Start {
-        match self.profile.points.get(self.first) {
+        match self.regime.point.as_ref().or_else(|| self.profile.points.get(self.first)) {
             Some(point) if point.speed_squared_lu2_s2 > 0.0 => Start::At(*point),
             _ => Start::Rest,
         }
@@ -260,54 +318,81 @@ impl Continuous {
     }
 }
 
-/// How many pieces a plan reaches; those that are no intervals by themselves get their grids. The first `known` ones have places already.
-fn reach(pieces: &mut [Piece<'_>], known: usize, start: Start) -> usize {
-    let (mut beyond_ratio, mut intervals) = (0.0, 0.0);
-    for index in 0..pieces.len() {
-        let length_lu = pieces[index].path.length_lu();
-        // A piece at a rest is cut by its own grid.
-        let at_rest = (index == 0 && start == Start::Rest) || pieces[index].rests_after;
-        let flow = &pieces[index].flow;
-        if index >= known && (at_rest || flow.brief.is_none()) {
-            cut_piece(pieces, index, start);
-        }
-        let flow = &pieces[index].flow;
-        let Some(stop_lu) = flow.stop_lu() else { continue };
-        intervals += match (&flow.grid, &flow.brief) {
-            (_, Some(brief)) => length_lu / (brief.speed_lu_s * flow.tangent.step_s),
-            (Some(grid), None) => grid.intervals.len() as f64,
-            (None, None) => 0.0,
-        };
-        if index > 0 {
-            // Each way in stopping distances of its own speed.
-            beyond_ratio += length_lu / stop_lu;
-        }
-        if beyond_ratio >= REACH_RATIO && intervals >= REACH_INTERVALS && index >= known {
-            return index + 1;
-        }
+/// Derivatives on the curve of an interval; `owners`: the piece with which each begins.
+fn look<'a>(pieces: &'a [Piece<'_>], owners: &'a [usize]) -> impl Fn(usize, f64) -> Derivatives + use<'a> {
+    move |index, s_lu| {
+        let paths = pieces[owners[index]..].iter().map(|piece| piece.path);
+        let place = group::place(paths, s_lu).unwrap_or((pieces[owners[index]].path, s_lu));
+        Derivatives::from(place.0.at(place.1))
     }
-    pieces.len()
 }
 
-/// Makes the grid of a piece, if it has none.
-fn cut_piece(pieces: &mut [Piece<'_>], index: usize, start: Start) {
-    if pieces[index].flow.grid.is_some() {
-        return;
+impl Continuous {
+    /// How many pieces a plan reaches; those that are no intervals by themselves get their grids. The first `known` ones have places already.
+    fn reach(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> usize {
+        let (mut beyond_ratio, mut intervals, mut beyond_lu) = (0.0, 0.0, 0.0);
+        for index in 0..pieces.len() {
+            pieces[index..].iter_mut().take(2).for_each(|piece| self.regime.look(piece));
+            let length_lu = pieces[index].path.length_lu();
+            // A piece at a rest is cut by its own grid.
+            let at_rest = (index == 0 && start == Start::Rest) || pieces[index].rests_after;
+            let flow = &pieces[index].flow;
+            if index >= known && (at_rest || flow.brief.is_none()) {
+                self.cut_piece(pieces, index, start);
+            }
+            let flow = &pieces[index].flow;
+            let Some(stop_lu) = flow.stop_lu() else { continue };
+            intervals += match (&flow.grid, &flow.brief) {
+                (_, Some(brief)) => length_lu / (brief.speed_lu_s * flow.tangent.step_s),
+                (Some(grid), None) => grid.intervals.len() as f64,
+                (None, None) => 0.0,
+            };
+            if index > 0 {
+                // Each way in stopping distances of its own speed.
+                beyond_ratio += length_lu / stop_lu;
+                beyond_lu += length_lu;
+            }
+            let enough = beyond_ratio >= REACH_RATIO && intervals >= REACH_INTERVALS;
+            if enough && index >= known && beyond_lu >= self.regime.reach_lu() {
+                return index + 1;
+            }
+        }
+        pieces.len()
     }
-    let junction_lu_s = |piece: &Piece<'_>| piece.junction.velocity_lu_s;
-    let before = index.checked_sub(1).map(|before| pieces[before].flow.ends_lu_s[1]);
-    let after = pieces.get(index + 1).map(|next| (next.flow.ends_lu_s[0], junction_lu_s(next)));
-    let piece = &mut pieces[index];
-    let own = piece.flow.ends_lu_s;
-    let first = match before {
-        Some(before_lu_s) => End::Speed(own[0].min(before_lu_s).min(piece.junction.velocity_lu_s)),
-        None if start == Start::Rest => End::Rest,
-        None => End::Speed(own[0]),
-    };
-    let last = match after {
-        _ if piece.rests_after => End::Rest,
-        Some((next_lu_s, junction_lu_s)) => End::Speed(own[1].min(next_lu_s).min(junction_lu_s)),
-        None => End::Speed(own[1]),
-    };
-    piece.flow.grid = Some(Grid::new(&piece.flow.rules, piece.path, piece.flow.blend, [first, last]));
+
+    /// Makes the grid of a piece, if it has none.
+    fn cut_piece(&self, pieces: &mut [Piece<'_>], index: usize, start: Start) {
+        if pieces[index].flow.grid.is_some() {
+            return;
+        }
+        let ends = self.ends(pieces, index, start);
+        let ahead_lu = match self.regime.transition {
+            Some(_) => pieces[..index].iter().map(|piece| piece.path.length_lu()).sum(),
+            None => 0.0,
+        };
+        let stretch = self.regime.stretch(pieces[index].path, ends, (index > 0).then_some(ahead_lu));
+        let Piece { path, flow, .. } = &mut pieces[index];
+        flow.grid = Some(Grid::new(&flow.rules, path, flow.blend, stretch));
+    }
+
+    /// About the speeds at the ends of a piece.
+    fn ends(&self, pieces: &[Piece<'_>], index: usize, start: Start) -> [End; 2] {
+        let junction_lu_s = |piece: &Piece<'_>| piece.junction.velocity_lu_s;
+        let before = index.checked_sub(1).map(|before| pieces[before].flow.ends_lu_s[1]);
+        let after = pieces.get(index + 1).map(|next| (next.flow.ends_lu_s[0], junction_lu_s(next)));
+        let piece = &pieces[index];
+        let own = piece.flow.ends_lu_s;
+        let first = match (before, start) {
+            (Some(before_lu_s), _) => End::Speed(own[0].min(before_lu_s).min(piece.junction.velocity_lu_s)),
+            (None, Start::Rest) => End::Rest,
+            (None, Start::At(point)) if self.regime.from_lu > 0.0 => End::Speed(point.speed_squared_lu2_s2.sqrt()),
+            (None, Start::At(_)) => End::Speed(own[0]),
+        };
+        let last = match after {
+            _ if piece.rests_after => End::Rest,
+            Some((next_lu_s, junction_lu_s)) => End::Speed(own[1].min(next_lu_s).min(junction_lu_s)),
+            None => End::Speed(own[1]),
+        };
+        [first, last]
+    }
 }

@@ -1,17 +1,17 @@
 //! A law that always exists: one piece from rest to rest, slowly.
 //!
-//! In: the intervals of a piece. Out: a seven-phase [`TimeLaw`] with the greatest demands of the whole piece: at the highest speed the bend takes half of
+//! In: the intervals of a piece, or of what is left of it. Out: a seven-phase [`TimeLaw`] with the greatest demands of the whole piece: at the highest speed the bend takes half of
 //! what each axis allows, and changes of speed take the rest. Used where no plan was found from a state of rest.
 
 use super::grid::Grid;
 use super::interval::Interval;
 use crate::feed::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use crate::feed::ramp::Dynamics;
-use crate::feed::{Limit, LimitKind, TimeLaw};
+use crate::feed::{Limit, LimitKind, Phase, TimeLaw};
 
 /// The law of a piece alone.
 pub(super) fn alone(grid: &Grid) -> TimeLaw {
-    let Some(last) = grid.intervals.last() else { return TimeLaw::default() };
+    let [Some(begin), Some(last)] = [grid.intervals.first(), grid.intervals.last()] else { return TimeLaw::default() };
     let limit = Limit { kind: LimitKind::LookAhead, axis: None };
     let cap = grid.intervals.iter().map(slow).fold(f64::INFINITY, f64::min);
     let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
@@ -33,7 +33,8 @@ pub(super) fn alone(grid: &Grid) -> TimeLaw {
         jerk: limit,
     };
     let rest = SpeedCap { velocity_lu_s: 0.0, limit };
-    seven_phases(&Stretch { length_lu: last.end_lu, entry: rest, exit: rest }, &bounds)
+    let law = seven_phases(&Stretch { length_lu: last.end_lu - begin.start_lu, entry: rest, exit: rest }, &bounds);
+    TimeLaw::new(law.phases().iter().map(|phase| Phase { start_lu: begin.start_lu + phase.start_lu, ..*phase }))
 }
 
 /// Highest speed at which the bend takes half of the limits.

@@ -83,6 +83,8 @@ pub(super) struct NodeRows<'a> {
     pub fixed: bool,
     /// b̂.
     pub estimate_lu2_s2: f64,
+    /// Lowest b here and at the next node.
+    pub floors_lu2_s2: [f64; 2],
 }
 
 impl NodeRows<'_> {
@@ -104,7 +106,8 @@ impl NodeRows<'_> {
             return;
         }
         self.hold([1.0 / cap_lu2_s2, 0.0, 0.0], 1.0);
-        self.push([-1.0 / self.scale.b_lu2_s2, 0.0, 0.0], -LOWEST_RATIO);
+        let floor = self.floors_lu2_s2[0] / self.scale.b_lu2_s2;
+        self.push([-1.0 / self.scale.b_lu2_s2, 0.0, 0.0], -LOWEST_RATIO.max(floor));
         let Some(before) = before else {
             self.acceleration(after, 0, 0.0, after.reserve_ratio);
             return;
@@ -145,7 +148,8 @@ impl NodeRows<'_> {
             let cap = interval.cap.velocity_lu_s * interval.cap.velocity_lu_s;
             self.hold([1.0 / cap, 0.5 * h / cap, 0.0], 1.0);
             let lowest = self.scale.b_lu2_s2;
-            self.push([-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO);
+            let floor = self.floors_lu2_s2[0].min(self.floors_lu2_s2[1]) / lowest;
+            self.push([-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO.max(floor));
         }
         if !interval.is_straight() {
             self.acceleration(interval, 1, 0.5 * h, interval.reserve_ratio);
