@@ -193,7 +193,8 @@ fn programs(usual: u64) -> u64 {
 
 #[test]
 fn every_limit_holds_through_random_changes_on_rounded_polylines() {
-    for seed in 0..programs(10) {
+    // In program 195 a plan from a slow place would have turned back between two places.
+    for seed in (0..programs(10)).chain([195]) {
         let mut random = Random::new(700 + seed);
         let machine = Machine { look_ahead_blocks: [2, 8, 60][seed as usize % 3], ..machine() };
         let walk = walk(&mut random, [40.0, 4.0][seed as usize % 2]);
