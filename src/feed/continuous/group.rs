@@ -28,6 +28,9 @@ const STEP_MAX_RATIO: [f64; 2] = [0.003, 0.02];
 const CAP_ROUNDING_RATIO: f64 = 1e-9;
 const FITTING_MIN_RATIO: f64 = 1.0 / 1024.0;
 
+/// Pieces before and after one that are looked at for slow places near it.
+const NEAR_PIECES: usize = 16;
+
 /// Pieces of one interval at most.
 const PIECES_MAX: usize = 64;
 
@@ -153,6 +156,46 @@ pub(super) fn border_speeds(pieces: &[Piece<'_>], from: usize, entry_lu_s: f64) 
         slow = rise(slow, &pieces[index], &mut speeds_lu_s[index]);
     }
     speeds_lu_s
+}
+
+/// Highest speed at the end of a piece, about: from there the path must come down to the slow places that follow, and to its rest.
+pub(super) fn speed_after_lu_s(pieces: &[Piece<'_>], index: usize) -> f64 {
+    let tangent = &pieces[index].flow.tangent;
+    let mut speed_lu_s = pieces[index].flow.ends_lu_s[1];
+    let mut way_lu = 0.0;
+    for next in pieces[index + 1..].iter().take(NEAR_PIECES) {
+        let here_lu_s = next.junction.velocity_lu_s.min(next.flow.ends_lu_s[0]);
+        speed_lu_s = speed_lu_s.min(tangent.reached_lu_s(here_lu_s, way_lu));
+        way_lu += next.path.length_lu();
+        let end_lu_s = if next.rests_after { 0.0 } else { next.flow.ends_lu_s[1] };
+        speed_lu_s = speed_lu_s.min(tangent.reached_lu_s(end_lu_s, way_lu));
+        if next.rests_after || way_lu > tangent.stop_lu(speed_lu_s) {
+            break;
+        }
+    }
+    speed_lu_s
+}
+
+/// The same at its start, from what is before it.
+pub(super) fn speed_before_lu_s(pieces: &[Piece<'_>], index: usize, starts_at_rest: bool) -> f64 {
+    let Piece { flow, junction, .. } = &pieces[index];
+    let tangent = &flow.tangent;
+    let mut speed_lu_s = flow.ends_lu_s[0].min(junction.velocity_lu_s);
+    let mut way_lu = 0.0;
+    for (number, before) in pieces[..index].iter().enumerate().rev().take(NEAR_PIECES) {
+        speed_lu_s = speed_lu_s.min(tangent.reached_lu_s(before.flow.ends_lu_s[1], way_lu));
+        way_lu += before.path.length_lu();
+        let start_lu_s = match number {
+            0 if starts_at_rest => 0.0,
+            0 => f64::INFINITY,
+            _ => before.junction.velocity_lu_s,
+        };
+        speed_lu_s = speed_lu_s.min(tangent.reached_lu_s(start_lu_s.min(before.flow.ends_lu_s[0]), way_lu));
+        if way_lu > tangent.stop_lu(speed_lu_s) {
+            break;
+        }
+    }
+    speed_lu_s
 }
 
 /// From a slow place, with its speed and the way since, over a piece: the speed beyond it is at most what is reached. The slow place after it.

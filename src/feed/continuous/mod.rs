@@ -384,22 +384,14 @@ impl Continuous {
 
     /// About the speeds at the ends of a piece.
     fn ends(&self, pieces: &[Piece<'_>], index: usize, start: Start) -> [End; 2] {
-        let junction_lu_s = |piece: &Piece<'_>| piece.junction.velocity_lu_s;
-        let before = index.checked_sub(1).map(|before| pieces[before].flow.ends_lu_s[1]);
-        let after = pieces.get(index + 1).map(|next| (next.flow.ends_lu_s[0], junction_lu_s(next)));
         let piece = &pieces[index];
-        let own = piece.flow.ends_lu_s;
-        let first = match (before, start) {
-            (Some(before_lu_s), _) => End::Speed(own[0].min(before_lu_s).min(piece.junction.velocity_lu_s)),
-            (None, Start::Rest) => End::Rest,
-            (None, Start::At(point)) if self.regime.from_lu > 0.0 => End::Speed(point.speed_squared_lu2_s2.sqrt()),
-            (None, Start::At(_)) => End::Speed(own[0]),
+        let first = match (index, start) {
+            (0, Start::Rest) => End::Rest,
+            (0, Start::At(point)) if self.regime.from_lu > 0.0 => End::Speed(point.speed_squared_lu2_s2.sqrt()),
+            (0, Start::At(_)) => End::Speed(piece.flow.ends_lu_s[0]),
+            _ => End::Speed(group::speed_before_lu_s(pieces, index, start == Start::Rest)),
         };
-        let last = match after {
-            _ if piece.rests_after => End::Rest,
-            Some((next_lu_s, junction_lu_s)) => End::Speed(own[1].min(next_lu_s).min(junction_lu_s)),
-            None => End::Speed(own[1]),
-        };
+        let last = if piece.rests_after { End::Rest } else { End::Speed(group::speed_after_lu_s(pieces, index)) };
         [first, last]
     }
 }
