@@ -1,11 +1,14 @@
 //! Throughput of planning and interpolation: pieces of path planned per second, set-points per second.
 //!
-//! In: a dense polyline of 0.5 mm segments, and one of 5 mm, both rounded. Out: criterion's report. Does not assert times.
+//! In: a dense polyline of 0.5 mm segments, and one of 5 mm, both rounded, and under `continuous` one of 0.3 mm as lines and compressed. Out:
+//! criterion's report. Does not assert times.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use sollwert::feed::Planner;
 use sollwert::interpolator::Interpolator;
-use sollwert::machine::PathMode;
+use sollwert::interpreter::Compressor;
+use sollwert::kinematics::JointPath;
+use sollwert::machine::{BlendShape, Machine, PathMode, TimeLawKind};
 use std::hint::black_box;
 
 #[path = "../tests/feed/support.rs"]
@@ -35,26 +38,53 @@ fn plan(criterion: &mut Criterion) {
         machine.look_ahead_blocks = window;
         let paths = program(segment_mm).paths(&machine);
         group.bench_function(format!("{segment_mm} mm, window {window}"), |bencher| {
-            bencher.iter_batched(
-                || paths.clone(),
-                |paths| {
-                    let mut planner = Planner::new(&machine);
-                    for path in paths {
-                        planner.push(path).unwrap();
-                        while let Some(piece) = planner.pop() {
-                            black_box(piece);
-                        }
-                    }
-                    planner.finish();
-                    while let Some(piece) = planner.pop() {
-                        black_box(piece);
-                    }
-                },
-                BatchSize::LargeInput,
-            );
+            bencher.iter_batched(|| paths.clone(), |paths| plan_all(&machine, paths), BatchSize::LargeInput);
         });
     }
     group.finish();
+}
+
+/// The same under `continuous`: lines as they are, and what the compressor makes of them; one window is ten times the other.
+fn plan_continuous(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("blocks planned, continuous");
+    group.sample_size(20);
+    group.throughput(Throughput::Elements(u64::from(BLOCKS)));
+    for (name, mode, compressor) in [
+        ("lines", PathMode::G64, Compressor::Off),
+        ("compressed", PathMode::G642, Compressor::Cad),
+        ("blends", PathMode::G642, Compressor::Off),
+    ] {
+        for window in [100, 1000] {
+            let mut machine = support::spinner();
+            machine.look_ahead_blocks = window;
+            machine.feed.time_law = TimeLawKind::Continuous;
+            machine.smoothing.shape = BlendShape::Quintic;
+            let mut program = program(0.3);
+            for motion in &mut program.moves {
+                motion.modes.path_mode = mode;
+                motion.modes.compressor = compressor;
+            }
+            let paths = program.paths(&machine);
+            group.bench_function(format!("{name}, window {window}"), |bencher| {
+                bencher.iter_batched(|| paths.clone(), |paths| plan_all(&machine, paths), BatchSize::LargeInput);
+            });
+        }
+    }
+    group.finish();
+}
+
+fn plan_all(machine: &Machine, paths: Vec<JointPath>) {
+    let mut planner = Planner::new(machine);
+    for path in paths {
+        planner.push(path).unwrap();
+        while let Some(piece) = planner.pop() {
+            black_box(piece);
+        }
+    }
+    planner.finish();
+    while let Some(piece) = planner.pop() {
+        black_box(piece);
+    }
 }
 
 fn sample(criterion: &mut Criterion) {
@@ -83,5 +113,5 @@ fn sample(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, plan, sample);
+criterion_group!(benches, plan, plan_continuous, sample);
 criterion_main!(benches);

@@ -134,3 +134,23 @@ fn a_word_that_stands_in_every_line_does_not_flood_the_terminal() {
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
     assert_eq!(document["errors"].as_array().map(Vec::len), Some(50));
 }
+
+#[test]
+fn an_override_that_cannot_be_followed_is_wrong_usage_with_its_place() {
+    let folder = folder("command_override");
+    let continuous = ["--set", "feed.time_law=continuous"];
+    let calls: [(&[&str], &str); 4] = [
+        (&["time", "good.mpf", "--override", "1=abc"], "C0007"),
+        (&["run", "good.mpf", "-o", "x.mcap", "--override", "2=50,1=60"], "C0007"),
+        (&["time", "good.mpf", "--override", "1=50", "--optimal"], "C0008"),
+        (&["time", "good.mpf", "--override", "1=50"], "K0008"),
+    ];
+    for (call, code) in calls {
+        let set: &[&str] = if code == "K0008" { &["--set", "feed.time_law=seven-phase"] } else { &continuous };
+        let output = sollwert(&folder, &[call, set, &["--json"]].concat());
+        let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one document");
+        assert_eq!((output.status.code(), document["errors"][0]["code"].as_str()), (Some(2), Some(code)), "{call:?}");
+    }
+    let marked = errors_of(&sollwert(&folder, &["time", "good.mpf", "--override", "1=50,2=abc"]));
+    assert!(marked.contains("1=50,2=abc") && marked.contains("^^^") && marked.contains("0.1 to 200"), "{marked}");
+}

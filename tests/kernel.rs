@@ -151,6 +151,35 @@ fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
 }
 
 #[test]
+fn a_change_of_the_override_is_the_same_on_any_number_of_threads_and_on_record() {
+    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous"]);
+    let mut recordings = Vec::new();
+    for threads in [1, 2, 2] {
+        let path = scratch(&format!("override_{threads}.mcap"));
+        let overrides = OverrideSchedule::parse("0.5=40,0.9=0,1.3=130").unwrap();
+        let outcome = run(
+            RunOptions {
+                machine: &loaded,
+                setup: program(PROGRAM).into(),
+                overrides,
+                drives: false,
+                recording: Some(&path),
+                mantissa_bits: None,
+                signals: SignalChoice::all(),
+                threads,
+                pace_ratio: None,
+            },
+            &mut |_| {},
+        )
+        .unwrap_or_else(|error| panic!("{:?}", error.0));
+        assert_eq!(outcome.summary.overrides.len(), 3);
+        assert!(outcome.summary.limits["override"] > 0.0);
+        recordings.push(std::fs::read(&path).unwrap());
+    }
+    assert!(recordings.windows(2).all(|pair| pair[0] == pair[1]));
+}
+
+#[test]
 fn figures_count_what_the_contract_says() {
     let loaded = machine("spinner_mvc850", &[]);
     let path = scratch("figures.mcap");

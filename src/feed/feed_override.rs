@@ -96,16 +96,20 @@ fn is_allowed(percent: f64) -> bool {
     percent == 0.0 || (LOWEST_PERCENT..=percent_from_ratio(OVERRIDE_MAX_RATIO)).contains(&percent)
 }
 
-/// A schedule on the set-points of a machine, and how far it has come.
+/// A schedule on the set-points of a machine and what synchronised actions add to it, and how far both have come.
 #[derive(Clone, Debug)]
 pub(super) struct OverrideCourse {
     /// Times are those of set-points.
     changes: Vec<OverrideChange>,
     /// Changes that are in force or past.
     done: usize,
-    /// Changes before the piece that was told of last.
-    told: usize,
-    setpoint_period_s: f64,
+    /// $AC_OVR, and when it changes next to what.
+    synchronised_ratio: f64,
+    synchronised_next: Option<OverrideChange>,
+    /// What came into force and has not been told of, and what was in force before that.
+    untold: Vec<OverrideChange>,
+    told_ratio: f64,
+    time_base: TimeBase,
 }
 
 impl OverrideCourse {
@@ -116,43 +120,96 @@ impl OverrideCourse {
             let k = (change.time_s / setpoint_period_s * (1.0 - SAME_TIME_RATIO)).ceil().max(0.0) as u64;
             OverrideChange { time_s: time_base.time_s(time_base.setpoint_tick(k)), ..*change }
         };
-        Self { changes: schedule.changes.iter().map(at_setpoint).collect(), done: 0, told: 0, setpoint_period_s }
+        Self {
+            changes: schedule.changes.iter().map(at_setpoint).collect(),
+            done: 0,
+            synchronised_ratio: 1.0,
+            synchronised_next: None,
+            untold: Vec::new(),
+            told_ratio: 1.0,
+            time_base,
+        }
     }
 
     /// Everything up to this time has happened.
     pub fn advance(&mut self, time_s: f64) {
         let by_s = time_s + SAME_TIME_RATIO * time_s;
-        self.done += self.changes[self.done..].iter().take_while(|change| change.time_s <= by_s).count();
+        loop {
+            let next = self.changes.get(self.done).filter(|change| change.time_s <= by_s).copied();
+            let added = self.synchronised_next.filter(|change| change.time_s <= by_s);
+            let before_ratio = self.ratio();
+            let time_s = match (next, added) {
+                (Some(next), added) if added.is_none_or(|added| next.time_s <= added.time_s) => {
+                    self.done += 1;
+                    next.time_s
+                }
+                (_, Some(added)) => {
+                    (self.synchronised_ratio, self.synchronised_next) = (added.override_ratio, None);
+                    added.time_s
+                }
+                _ => return,
+            };
+            if self.ratio() != before_ratio {
+                self.untold.push(OverrideChange { time_s, override_ratio: self.ratio() });
+            }
+        }
     }
 
     /// What is in force.
     pub fn ratio(&self) -> f64 {
+        (self.panel_ratio() * self.synchronised_ratio).min(OVERRIDE_MAX_RATIO)
+    }
+
+    fn panel_ratio(&self) -> f64 {
         self.done.checked_sub(1).map_or(1.0, |last| self.changes[last].override_ratio)
     }
 
-    /// When it changes next; infinite: never again.
+    /// When it changes next, as far as is known; infinite: never.
     pub fn next_s(&self) -> f64 {
-        let now = self.ratio();
-        let next = self.changes[self.done..].iter().find(|change| change.override_ratio != now);
-        next.map_or(f64::INFINITY, |change| change.time_s)
+        let now = self.panel_ratio();
+        let panel = self.changes[self.done..].iter().find(|change| change.override_ratio != now);
+        let next = [panel, self.synchronised_next.as_ref()].into_iter().flatten();
+        next.map(|change| change.time_s).fold(f64::INFINITY, f64::min)
     }
 
-    /// What is in force from one time to another, counted from the first; empty: 100 %. Times asked for do not fall.
+    /// $AC_OVR as it is and, if that is decided, will be.
+    pub fn synchronised_ratio(&self) -> (f64, bool) {
+        (self.synchronised_ratio, self.synchronised_next.is_some())
+    }
+
+    /// $AC_OVR from set-point `k` on.
+    pub fn synchronise(&mut self, k: u64, override_ratio: f64) {
+        self.synchronised_next = Some(OverrideChange { time_s: self.setpoint_s(k), override_ratio });
+    }
+
+    /// What is in force from one time to another, counted from the first; empty: 100 %. Times asked for do not fall, and everything up to the second one
+    /// has happened.
     pub fn steps(&mut self, from_s: f64, to_s: f64) -> Vec<OverrideStep> {
-        let by = |time_s: f64| time_s + SAME_TIME_RATIO * time_s;
-        self.told += self.changes[self.told..].iter().take_while(|change| change.time_s <= by(from_s)).count();
-        let first_ratio = self.told.checked_sub(1).map_or(1.0, |last| self.changes[last].override_ratio);
-        let later = self.changes[self.told..].iter().take_while(|change| change.time_s <= by(to_s));
-        let later = later.map(|change| OverrideStep {
-            from_s: (change.time_s - SAME_TIME_RATIO * change.time_s - from_s).max(0.0),
-            override_ratio: change.override_ratio,
-        });
-        let steps = std::iter::once(OverrideStep { from_s: 0.0, override_ratio: first_ratio }).chain(later);
-        if self.told >= self.changes.len() && first_ratio == 1.0 { Vec::new() } else { steps.collect() }
+        self.advance(to_s);
+        let mut steps = vec![];
+        for change in self.untold.drain(..) {
+            let after_s = change.time_s - SAME_TIME_RATIO * change.time_s - from_s;
+            if after_s > 0.0 {
+                if steps.is_empty() {
+                    steps.push(OverrideStep { from_s: 0.0, override_ratio: self.told_ratio });
+                }
+                steps.push(OverrideStep { from_s: after_s, override_ratio: change.override_ratio });
+            }
+            self.told_ratio = change.override_ratio;
+        }
+        if steps.is_empty() && self.told_ratio != 1.0 {
+            steps.push(OverrideStep { from_s: 0.0, override_ratio: self.told_ratio });
+        }
+        steps
+    }
+
+    /// Time of a set-point.
+    pub fn setpoint_s(&self, k: u64) -> f64 {
+        self.time_base.time_s(self.time_base.setpoint_tick(k))
     }
 
     /// t_s.
     pub fn setpoint_period_s(&self) -> f64 {
-        self.setpoint_period_s
+        self.time_base.setpoint_period_s()
     }
 }

@@ -17,7 +17,9 @@ use super::modes::ModeRules;
 use super::positioning::Arrivals;
 use super::profile::{Bounds, SpeedCap, Stretch, seven_phases, standstill};
 use super::published::{self, Tally};
+use super::spindle::Spindle;
 use super::split::{self, Part};
+use super::synchronised::SynchronisedActions;
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
@@ -25,11 +27,14 @@ use crate::interpreter::Feed;
 use crate::kinematics::JointPath;
 use crate::machine::{BlendLaw, Machine, TimeLawKind};
 use crate::program::BlockRef;
-use crate::smoothing::PieceKind;
+use crate::smoothing::{ContourPiece, PieceKind};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+mod checks;
 mod flowing;
+
+use checks::{check_flow, check_motion, check_time};
 
 /// Plans speeds over a window of the path.
 #[derive(Clone, Debug)]
@@ -61,6 +66,8 @@ pub struct Planner {
     cutting_s: f64,
     /// Axes that move on their own.
     arrivals: Arrivals,
+    /// What feeds wait for; `None`: they do not.
+    spindle: Option<Spindle>,
     /// What the printed blend law did.
     published: Tally,
     /// Where it came to a stand first, and whether that has been told.
@@ -69,8 +76,11 @@ pub struct Planner {
     half_blend_lu: f64,
     /// The law `continuous`; `None` under `seven-phase`.
     continuous: Option<Box<Continuous>>,
-    /// The feed override at run time.
+    /// The feed override at run time, and what acts on it.
     overrides: OverrideCourse,
+    actions: SynchronisedActions,
+    /// Where the override holds the path for ever, and whether that has been told.
+    held: Option<(BlockRef, bool)>,
 }
 
 /// A piece in the window or before it.
@@ -114,6 +124,8 @@ enum Motion {
     Waits { time_s: f64 },
     /// Stands still until these axes have arrived.
     WaitsFor { axes: PerAxis<bool> },
+    /// Stands still until the spindle is near its speed.
+    WaitsForSpindle,
     /// Takes neither way nor time: speed passes through it.
     Nothing,
 }
@@ -137,11 +149,14 @@ impl Planner {
             elapsed_s: 0.0,
             cutting_s: 0.0,
             arrivals: Arrivals::new(),
+            spindle: Spindle::new(machine.spindle),
             published: Tally::default(),
             stalled: None,
             half_blend_lu: 0.0,
             continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
             overrides: OverrideCourse::new(&OverrideSchedule::none(), machine.cycle.time_base),
+            actions: SynchronisedActions::default(),
+            held: None,
         }
     }
 
@@ -159,6 +174,10 @@ impl Planner {
     /// The alarm of the piece handed out last, with its block: the path comes to rest at the end of what was pushed, after
     /// [`Planner::finish`].
     pub fn take_alarm(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        if let Some((block, told @ false)) = &mut self.held {
+            *told = true;
+            return Some((*block, checks::held(*block)));
+        }
         let (block, told) = self.stalled.as_mut()?;
         (!std::mem::replace(told, true)).then(|| (*block, published::stalled(*block)))
     }
@@ -195,7 +214,8 @@ impl Planner {
     }
 
     fn push_part(&mut self, part: Part) -> Result<(), Box<Diagnostic>> {
-        let Part { path, worst } = part;
+        let Part { mut path, worst } = part;
+        self.wait_for_spindle(&mut path);
         let contour = &path.contour;
         let mut rests_after = contour.stop_at_end;
         let mut corner = FREE;
@@ -244,6 +264,34 @@ impl Planner {
         Ok(())
     }
 
+    /// Before a feed that follows a change of the spindle speed, or begins with one, the path rests. What happens when the piece begins happens
+    /// when the wait does.
+    fn wait_for_spindle(&mut self, path: &mut JointPath) {
+        let contour = &mut path.contour;
+        let curve = contour.curve().filter(|curve| curve.length_lu() != 0.0);
+        let feeds = curve.is_some() && contour.feed != Feed::Rapid;
+        if !self.spindle.as_mut().is_some_and(|spindle| spindle.push(&contour.events, feeds)) {
+            return;
+        }
+        let Some(at) = contour.curve().map(Curve::start) else { return };
+        let wait = ContourPiece {
+            kind: PieceKind::Wait { time_s: 0.0, at },
+            events: std::mem::take(&mut contour.events),
+            blocks_begun: 0,
+            block_length_lu: None,
+            stop_at_end: true,
+            ..contour.clone()
+        };
+        self.last = None;
+        self.entries.push_back(Entry {
+            path: JointPath { contour: wait, transformation: path.transformation.clone() },
+            motion: Motion::WaitsForSpindle,
+            corner: STOP,
+            rests_after: true,
+            entry: REST,
+        });
+    }
+
     /// No more pieces: the path ends at rest.
     pub fn finish(&mut self) {
         self.finished = true;
@@ -255,9 +303,10 @@ impl Planner {
     /// finished.
     pub fn pop(&mut self) -> Option<PlannedPiece> {
         self.admit();
-        if self.admitted == 0 || !(self.full || self.finished || self.rests > 0) {
+        if self.admitted == 0 || self.held.is_some() || !(self.full || self.finished || self.rests > 0) {
             return None;
         }
+        self.actions.begin(&self.entries.front()?.path, self.elapsed_s);
         let flowing = self.flow();
         if self.continuous.is_none() {
             self.plan_backward();
@@ -268,9 +317,17 @@ impl Planner {
         let events = &front.path.contour.events;
         let positionings =
             if events.is_empty() { Vec::new() } else { self.arrivals.set_out(machine, events, self.elapsed_s) };
+        if let Some(spindle) = &mut self.spindle {
+            spindle.begin(events, self.elapsed_s);
+        }
         let (law, exit) = match &front.motion {
             Motion::WaitsFor { axes } => {
                 let (time_s, limit) = self.arrivals.wait(machine, axes, self.elapsed_s);
+                (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
+            }
+            Motion::WaitsForSpindle => {
+                let time_s = self.spindle.as_ref().map_or(0.0, Spindle::ready_s) - self.elapsed_s;
+                let limit = Limit { kind: LimitKind::Spindle, axis: None };
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
             Motion::Flows(_) => (flowing.unwrap_or_default(), STOP),
@@ -279,6 +336,10 @@ impl Planner {
                 None => front.fixed(self.entry, ahead, self.setpoint_period_s),
             },
         };
+        if self.continuous.is_some() && !matches!(front.motion, Motion::Flows(_)) {
+            self.stand_by(&front.path, &law);
+        }
+        self.actions.pass(&front.path);
         let start_s = self.elapsed_s;
         self.elapsed_s += law.duration_s();
         let overrides = self.overrides.steps(start_s, self.elapsed_s);
@@ -379,7 +440,7 @@ impl Planner {
                     self.changed_from = self.changed_from.min(before);
                 }
             }
-            Motion::Waits { .. } | Motion::WaitsFor { .. } => self.half_blend_lu = 0.0,
+            Motion::Waits { .. } | Motion::WaitsFor { .. } | Motion::WaitsForSpindle => self.half_blend_lu = 0.0,
             Motion::Flows(_) | Motion::Nothing => {}
         }
     }
@@ -454,7 +515,7 @@ impl Entry {
             }
             Motion::Waits { time_s } => (standstill(*time_s, Limit { kind: LimitKind::Dwell, axis: None }), STOP),
             // A wait for axes gets its time where it is handed out.
-            Motion::WaitsFor { .. } | Motion::Flows(_) => (TimeLaw::new([]), STOP),
+            Motion::WaitsFor { .. } | Motion::WaitsForSpindle | Motion::Flows(_) => (TimeLaw::new([]), STOP),
             Motion::Nothing => (TimeLaw::new([]), ahead.min(entry)),
         }
     }
@@ -469,7 +530,7 @@ impl Motion {
                 limit: Limit { kind: LimitKind::Cycle, axis: None },
             }),
             Self::Moves { limits, .. } => limits.cap,
-            Self::Waits { .. } | Self::WaitsFor { .. } => STOP,
+            Self::Waits { .. } | Self::WaitsFor { .. } | Self::WaitsForSpindle => STOP,
             Self::Flows(_) | Self::Nothing => FREE,
         }
     }
@@ -492,7 +553,7 @@ impl Motion {
                 let limit = if exit == REST { cap.limit } else { exit.cap.limit };
                 Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }
             }
-            Self::Waits { .. } | Self::WaitsFor { .. } => REST,
+            Self::Waits { .. } | Self::WaitsFor { .. } | Self::WaitsForSpindle => REST,
             Self::Flows(_) | Self::Nothing => exit,
         }
     }
@@ -500,63 +561,3 @@ impl Motion {
 
 /// Pieces that one plan of the law `continuous` looks at, at most.
 const PLANNED_PIECES_MAX: usize = 4096;
-
-/// As [`check_motion`], under `continuous`.
-fn check_flow(flow: &Flow, length_lu: f64, path: &JointPath, blocked: Option<String>) -> Result<(), Box<Diagnostic>> {
-    let [first_lu_s, last_lu_s] = flow.ends_lu_s();
-    let numbers = [length_lu, first_lu_s, last_lu_s];
-    if blocked.is_none() && numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
-        return check_time(length_lu / first_lu_s.max(last_lu_s), path);
-    }
-    Err(no_speed(path, blocked))
-}
-
-/// A motion or wait longer than this is an alarm: 1e6 s are 11 days.
-const PIECE_TIME_MAX_S: f64 = 1e6;
-
-/// The alarm of a motion whose length or limits are not numbers, or which takes for ever: without numbers there is no law, and to
-/// leave the piece out would make the axes jump over it. Checked machines and programs within their bounds do not give the first; a
-/// feed of 1e-7 mm/min or a position of 1e15 mm gives the second.
-fn check_motion(
-    limits: &PieceLimits,
-    length_lu: f64,
-    path: &JointPath,
-    blocked: Option<String>,
-) -> Result<(), Box<Diagnostic>> {
-    let dynamics = &limits.bounds.dynamics;
-    let numbers = [
-        length_lu,
-        limits.cap.velocity_lu_s,
-        limits.ramp_cap.velocity_lu_s,
-        dynamics.acceleration_lu_s2,
-        dynamics.jerk_lu_s3.unwrap_or(1.0),
-    ];
-    if numbers.iter().all(|number| number.is_finite() && *number > 0.0) {
-        return check_time(length_lu / limits.cap.velocity_lu_s, path);
-    }
-    Err(no_speed(path, blocked))
-}
-
-fn no_speed(path: &JointPath, blocked: Option<String>) -> Box<Diagnostic> {
-    let line = path.contour.block.line;
-    let message = format!("the motion of line {line} has no speed that every axis allows");
-    Box::new(match blocked {
-        Some(blocked) => Diagnostic::error("P0001", format!("{message}: {blocked}"))
-            .help("look at the limits of that axis in the machine file, with its dynamics sets"),
-        None => Diagnostic::error("P0001", message)
-            .help("look for coordinates far outside the machine, or a circle of hardly any radius"),
-    })
-}
-
-/// The alarm of a motion or wait that lasts `time_s` at least.
-fn check_time(time_s: f64, path: &JointPath) -> Result<(), Box<Diagnostic>> {
-    if time_s <= PIECE_TIME_MAX_S {
-        return Ok(());
-    }
-    let line = path.contour.block.line;
-    let message = format!("the block in line {line} takes {time_s:.3e} s, more than 11 days");
-    Err(Box::new(
-        Diagnostic::error("P0002", message)
-            .help("check its feed, its end position and its dwell, and the velocity limits of the machine"),
-    ))
-}

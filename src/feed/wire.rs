@@ -45,6 +45,8 @@ pub enum LimitKind {
     Positioning,
     /// Feed override.
     Override,
+    /// Waiting for the spindle to come to its speed.
+    Spindle,
 }
 
 impl LimitKind {
@@ -65,6 +67,7 @@ impl LimitKind {
             Self::InPosition => "in_position",
             Self::Positioning => "positioning",
             Self::Override => "override",
+            Self::Spindle => "spindle",
         }
     }
 }

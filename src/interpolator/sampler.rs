@@ -19,6 +19,9 @@ use crate::smoothing::{Corner, PieceKind};
 /// A path that ends this share of its time after a tick ends on that tick: times are sums of rounded durations.
 const SAME_TIME_RATIO: f64 = 1e-9;
 
+/// A law that ends this share of its piece before its end has stopped there.
+const STOPPED_SHARE: f64 = 1e-6;
+
 /// Pieces that may begin in one cycle before the list of them has to grow.
 const BEGUN_USUAL: usize = 64;
 
@@ -254,7 +257,11 @@ impl Active {
     fn at_end(&self) -> PathState {
         let limit =
             self.piece.law.phases().last().map_or(Limit { kind: LimitKind::Feed, axis: None }, |last| last.limit);
-        PathState { position_lu: self.length_lu, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
+        // A path that an alarm has stopped inside a block ends there.
+        let reached_lu = self.piece.law.at(self.piece.law.duration_s()).position_lu;
+        let stopped = reached_lu < (1.0 - STOPPED_SHARE) * self.length_lu && !self.piece.law.phases().is_empty();
+        let position_lu = if stopped { reached_lu } else { self.length_lu };
+        PathState { position_lu, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
     }
 }
 

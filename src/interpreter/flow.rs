@@ -85,7 +85,9 @@ impl Interpreter {
             Statement::ModalCall(call) => self.modal_call(call.as_deref()),
             Statement::CallPath(path) => self.set_call_path(path.as_ref()),
             Statement::Return(wanted) => self.return_from(wanted),
-            // MCALL of a cycle that is not made, or a synchronised action.
+            Statement::Synchronised(action) => self.synchronise(action),
+            Statement::Cancel(numbers) => self.cancel_synchronised(numbers),
+            // MCALL of a cycle that is not made, or another synchronised action.
             Statement::NotActedOn(entry, columns) => {
                 if !is_synchronised(entry.word) {
                     self.modal_call = None;

@@ -27,7 +27,7 @@ use super::value::trimmed;
 use super::wire::{
     Compressor, CornerInsert, CornerShape, Event, ExactStop, Feed, Modes, Move, MoveKind, ProgrammedLimits,
 };
-use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s};
+use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s, percent_from_ratio};
 use crate::base::{AxisKind, PartPoint};
 use crate::machine::{AccelerationMode, Axis, DynamicsMode, Machine, PathMode};
 use std::fmt::Write;
@@ -292,6 +292,8 @@ fn event_text(event: &Event) -> String {
         Event::Trace(starts) => format!("trace={}", if *starts { "start" } else { "stop" }),
         Event::HFunction(value) => format!("H{}", trimmed(*value)),
         Event::Position(_) => "position".to_owned(),
+        Event::Synchronised(action) => format!("$AC_OVR={}", trimmed(percent_from_ratio(action.override_ratio))),
+        Event::CancelSynchronised(ids) => format!("CANCEL{ids:?}"),
         Event::Spindle(text) => text.to_string(),
     }
 }

@@ -49,6 +49,7 @@ mod setup;
 pub mod spline;
 mod spline_blocks;
 mod strings;
+mod synchronised;
 mod system_constants;
 mod system_values;
 mod tool_variables;

@@ -5,7 +5,7 @@
 use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
 pub use crate::program::words::{Compressor, ExactStop};
-use crate::program::{BlockRef, OpenedProgram};
+use crate::program::{BlockRef, Cadence, OpenedProgram};
 use std::sync::Arc;
 
 /// One executed block that moves, waits or does something.
@@ -293,6 +293,95 @@ pub struct MainRun {
     pub cutting_time_s: f64,
 }
 
+/// A synchronised action on $AC_OVR.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SynchronisedAction {
+    /// ID; `None`: it ends with the block that it begins with.
+    pub id: Option<u32>,
+    /// How often it happens.
+    pub cadence: Cadence,
+    /// On what.
+    pub condition: Condition,
+    /// $AC_OVR, for the cycles in which it happens.
+    pub override_ratio: f64,
+}
+
+/// A condition of the main run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Condition {
+    /// Known beforehand.
+    Constant(bool),
+    /// A value of the main run against one that is known beforehand, in the unit of [`Watched`].
+    Compare(Watched, Relation, f64),
+    /// NOT.
+    Not(Box<Condition>),
+    /// AND.
+    All(Box<[Condition; 2]>),
+    /// OR.
+    Any(Box<[Condition; 2]>),
+}
+
+/// What can be watched at each set-point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watched {
+    /// $AA_IM: mm or rad.
+    Position(AxisId),
+    /// $AC_TIME: s since the block began.
+    BlockTime,
+    /// $AC_TIMEC: cycles since then.
+    BlockCycles,
+    /// $AC_PATHN: done of the block, 0 to 1.
+    PathShare,
+    /// $AC_DTBB: way since the block began, mm.
+    WayDone,
+    /// $AC_DTEB: way to its end, mm.
+    WayLeft,
+    /// $AC_VACTB: speed on the path, mm/s.
+    PathVelocity,
+}
+
+/// How two values are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relation {
+    /// ==
+    Equal,
+    /// <>
+    Unequal,
+    /// <
+    Less,
+    /// <=
+    NotGreater,
+    /// >
+    Greater,
+    /// >=
+    NotLess,
+}
+
+impl Relation {
+    /// With its sides exchanged.
+    pub fn turned(self) -> Self {
+        match self {
+            Self::Less => Self::Greater,
+            Self::NotGreater => Self::NotLess,
+            Self::Greater => Self::Less,
+            Self::NotLess => Self::NotGreater,
+            same => same,
+        }
+    }
+
+    /// Whether it holds.
+    pub fn holds(self, left: f64, right: f64) -> bool {
+        match self {
+            Self::Equal => left == right,
+            Self::Unequal => left != right,
+            Self::Less => left < right,
+            Self::NotGreater => left <= right,
+            Self::Greater => left > right,
+            Self::NotLess => left >= right,
+        }
+    }
+}
+
 /// What is output at the start of a block.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
@@ -317,6 +406,10 @@ pub enum Event {
     HFunction(f64),
     /// Axes set out on their own (smoothing makes it of a `MoveKind::Position`).
     Position(Arc<Positioning>),
+    /// A synchronised action that begins.
+    Synchronised(Arc<SynchronisedAction>),
+    /// CANCEL: the actions of these numbers end.
+    CancelSynchronised(Arc<[u32]>),
     /// S, M of a spindle other than the master spindle, SPOS: as text, such as "S2=500".
     Spindle(Arc<str>),
 }

@@ -25,11 +25,16 @@ pub fn tables() -> &'static [TableKeys] {
 }
 
 const TABLES: &[TableKeys] = &[
-    TableKeys { path: "", keys: ROOT, tables: &["cycle", "look_ahead", "feed", "smoothing", "kinematics", "axes"] },
+    TableKeys {
+        path: "",
+        keys: ROOT,
+        tables: &["cycle", "look_ahead", "feed", "smoothing", "spindle", "kinematics", "axes"],
+    },
     TableKeys { path: "cycle", keys: CYCLE, tables: &[] },
     TableKeys { path: "look_ahead", keys: LOOK_AHEAD, tables: &[] },
     TableKeys { path: "feed", keys: FEED, tables: &[] },
     TableKeys { path: "smoothing", keys: SMOOTHING, tables: &[] },
+    TableKeys { path: "spindle", keys: SPINDLE, tables: &[] },
     TableKeys { path: "kinematics", keys: KINEMATICS, tables: &[] },
     TableKeys { path: "kinematics.rotary", keys: JOINT, tables: &[] },
     TableKeys { path: "axes.*", keys: AXIS, tables: &["dynamics", "drive", "motor", "mechanics", "encoder"] },
@@ -234,6 +239,25 @@ const SMOOTHING: &[Key] = &[
         "turning angle from which the compressor leaves a corner",
     )
     .md("SD42470"),
+];
+
+const SPINDLE: &[Key] = &[
+    Key::new(
+        "acceleration_rot_s2",
+        "rot/s²",
+        Number(Range::Between(0.1, 1e5)),
+        Means("at its speed at once"),
+        "acceleration of the master spindle in speed control",
+    )
+    .md("MD35200"),
+    Key::new(
+        "speed_tolerance",
+        "",
+        Number(Range::Between(0.0, 1.0)),
+        Value(0.1),
+        "a feed waits until the speed is this near, as a share of it",
+    )
+    .md("MD35150, MD35500"),
 ];
 
 const KINEMATICS: &[Key] = &[

@@ -21,10 +21,21 @@ pub struct Machine {
     pub feed: FeedSettings,
     /// `[smoothing]`.
     pub smoothing: SmoothingSettings,
+    /// `[spindle]`; `None`: the master spindle is at its speed at once.
+    pub spindle: Option<SpindleSettings>,
     /// `[kinematics]`.
     pub kinematics: KinematicsSettings,
     /// Axes in order of their `index`; [`AxisId`] is the place in this list.
     pub axes: Vec<Axis>,
+}
+
+/// How the master spindle comes to its speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpindleSettings {
+    /// In speed control.
+    pub acceleration_rad_s2: f64,
+    /// A feed waits until the speed is this near; 0: it does not wait.
+    pub tolerance_share: f64,
 }
 
 impl Machine {

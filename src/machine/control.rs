@@ -1,14 +1,14 @@
-//! `[cycle]`, `[look_ahead]`, `[feed]`, `[smoothing]` and `[kinematics]`: from the file to checked settings.
+//! `[cycle]`, `[look_ahead]`, `[feed]`, `[smoothing]`, `[spindle]` and `[kinematics]`: from the file to checked settings.
 //!
 //! In: the sections of a machine file. Out: the settings in internal units. Checks what needs more than one key: that the axes of
 //! the kinematics exist and turn, that a direction is one. The clock is made in `clock`, after the axes.
 
-use super::checked::{Axis, FeedSettings, KinematicsSettings, RotaryJoint, SmoothingSettings};
+use super::checked::{Axis, FeedSettings, KinematicsSettings, RotaryJoint, SmoothingSettings, SpindleSettings};
 use super::choices::{Carries, Choice, KinematicsType};
 use super::document::Node;
 use super::section::Section;
 use crate::base::diagnostics::{Diagnostic, nearest};
-use crate::base::units::rad_from_deg;
+use crate::base::units::{rad_from_deg, rad_from_rot};
 use crate::base::{AxisId, AxisKind};
 
 /// Rotary axes that a kinematic chain may have.
@@ -51,6 +51,13 @@ pub(super) fn smoothing(root: &Section<'_>) -> SmoothingSettings {
         compressor_length_max_mm: smoothing.number("compressor_length_max_mm"),
         compressor_corner_rad: rad_from_deg(smoothing.number("compressor_corner_deg")),
     }
+}
+
+pub(super) fn spindle(root: &Section<'_>) -> Option<SpindleSettings> {
+    let spindle = root.table("spindle", "spindle");
+    let tolerance_share = spindle.number("speed_tolerance");
+    let acceleration_rot_s2 = spindle.optional_number("acceleration_rot_s2")?;
+    Some(SpindleSettings { acceleration_rad_s2: rad_from_rot(acceleration_rot_s2), tolerance_share })
 }
 
 pub(super) fn kinematics(root: &Section<'_>, axes: &[Axis]) -> KinematicsSettings {

@@ -162,6 +162,7 @@ fn machine(root: &Section<'_>) -> Machine {
         look_ahead_blocks: control::look_ahead_blocks(root),
         feed: control::feed(root),
         smoothing: control::smoothing(root),
+        spindle: control::spindle(root),
         kinematics: control::kinematics(root, &axes),
         axes,
     }

@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 /// The schema; `machines/machine.schema.json` is this, printed.
 pub fn schema() -> Value {
     let mut root = object("", None);
-    let tables = ["cycle", "look_ahead", "feed", "smoothing", "kinematics"];
+    let tables = ["cycle", "look_ahead", "feed", "smoothing", "spindle", "kinematics"];
     for table in tables {
         set(&mut root, &["properties", table], object(table, None));
     }

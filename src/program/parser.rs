@@ -10,6 +10,7 @@ use super::dialect::Dialect;
 use super::expression::{arguments, expected, expression, indices, not_built, unused_expression};
 use super::lexer::{Lexer, Number, Token};
 use super::statements::{initial, statement};
+use super::synchronised::{cancelled, synchronised};
 use super::syntax::{
     Address, AddressValue, Block, BlockNumber, Expr, ExprKind, Form, IndexedValue, Initial, Statement, SystemName,
     Target, Word, WordKind,
@@ -55,8 +56,18 @@ fn parse_words(text: &str, dialect: &Dialect) -> Outcome<Block> {
                 return end_of_block(lexer, block);
             }
             Some(Role::NotActedOn(entry)) if SYNCHRONISED.contains(&entry.word) => {
-                block.statement = Statement::NotActedOn(entry, columns);
+                block.statement = match synchronised(entry, columns.clone(), lexer) {
+                    Some(action) => Statement::Synchronised(Box::new(action)),
+                    None => Statement::NotActedOn(entry, columns),
+                };
                 return Ok(block);
+            }
+            Some(Role::NotActedOn(entry)) if entry.word == "CANCEL" => {
+                let mut ahead = lexer;
+                if let Some(numbers) = cancelled(&mut ahead) {
+                    block.statement = Statement::Cancel(numbers);
+                    return Ok(block);
+                }
             }
             _ => {
                 if let Some(call) = call_by_name(name, columns, &mut lexer, dialect)? {

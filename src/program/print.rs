@@ -6,6 +6,7 @@
 
 use super::dialect::Dialect;
 use super::parser::is_synchronised;
+use super::synchronised::Synchronised;
 use super::syntax::{
     Address, AddressValue, Block, Case, DefinedVariable, Definition, Destination, Expr, ExprKind, ForLoop, Form,
     IndexedValue, Initial, Jump, Statement, SystemName, Target, Unary, VariableType, Word, WordKind,
@@ -80,6 +81,17 @@ impl Printer<'_> {
             }
             Statement::CallPath(path) => self.call_path(path.as_ref()),
             Statement::Return(wanted) => self.return_statement(wanted),
+            Statement::Synchronised(action) => self.synchronised(action),
+            Statement::Cancel(numbers) => {
+                self.word("CANCEL(");
+                for (index, number) in numbers.iter().enumerate() {
+                    if index > 0 {
+                        self.text.push(',');
+                    }
+                    self.expression(number);
+                }
+                self.text.push(')');
+            }
             Statement::NotActedOn(entry, _) => {
                 if !is_synchronised(entry.word) {
                     self.word("MCALL");
@@ -87,6 +99,18 @@ impl Printer<'_> {
                 self.word(entry.word);
             }
         }
+    }
+
+    fn synchronised(&mut self, action: &Synchronised) {
+        if let Some(id) = action.id {
+            self.word(&format!("ID={id}"));
+        }
+        if let Some(condition) = &action.condition {
+            self.with(action.cadence.word(), condition);
+        }
+        self.word("DO");
+        self.word("$AC_OVR=");
+        self.expression(&action.override_percent);
     }
 
     fn for_loop(&mut self, for_loop: &ForLoop) {

@@ -5,6 +5,7 @@
 
 pub use super::call_syntax::{Call, Callee, Header, Parameter, RepeatBlocks, Return};
 use super::codes::Columns;
+use super::synchronised::Synchronised;
 use super::words::{Function, GFunction, IndexedAddress, Keyword, NotActedOn, Procedure};
 use crate::base::AxisId;
 use std::sync::Arc;
@@ -82,7 +83,11 @@ pub enum Statement {
     CallPath(Option<Expr>),
     /// RET.
     Return(Box<Return>),
-    /// A whole line that is known but not acted on (synchronised actions).
+    /// A synchronised action on $AC_OVR.
+    Synchronised(Box<Synchronised>),
+    /// CANCEL: the actions of these numbers end.
+    Cancel(Vec<Expr>),
+    /// A whole line that is known but not acted on (other synchronised actions).
     NotActedOn(&'static NotActedOn, Columns),
 }
 

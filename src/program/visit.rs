@@ -42,6 +42,17 @@ pub fn visit_expressions(statement: &Statement, visit: &mut impl FnMut(&Expr)) {
     }
 }
 
+/// True if an expression reads a variable of the main run, or one that this program does not know.
+pub fn mentions_main_run(expression: &Expr) -> bool {
+    let mut found = false;
+    visit_expression(expression, &mut |expression| {
+        if let ExprKind::System(SystemName { name, .. }) = &expression.kind {
+            found |= SystemVariable::find(name).is_none_or(|variable| variable.main_run);
+        }
+    });
+    found
+}
+
 /// True if a statement reads a variable of the main run.
 pub fn reads_main_run(statement: &Statement) -> bool {
     let mut found = false;

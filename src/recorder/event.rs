@@ -72,8 +72,8 @@ impl From<&Event> for EventRecord {
             Event::Trace(starts) => Self::Trace(*starts),
             Event::HFunction(value) => Self::HFunction(*value),
             Event::Spindle(text) => Self::Spindle(text.clone()),
-            // The axes themselves are on record.
-            Event::Position(_) => Self::BlockStart,
+            // The axes and the override themselves are on record.
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) => Self::BlockStart,
         }
     }
 }

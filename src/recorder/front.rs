@@ -131,7 +131,7 @@ impl Recorder {
         if let Event::ProgramOpened(program) = event {
             self.attach_program(tick, program);
         }
-        if !matches!(event, Event::Position(_)) {
+        if !matches!(event, Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_)) {
             self.event(tick, Some(block), event.into());
         }
     }

@@ -10,5 +10,7 @@ mod profile;
 mod programmed_time;
 mod published;
 mod sampled;
+mod spindle;
 mod support;
+mod synchronised;
 mod window;

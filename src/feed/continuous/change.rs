@@ -15,7 +15,6 @@ use super::regime::rapids;
 use super::{Continuous, Piece, look};
 use crate::feed::PathState;
 use crate::feed::ramp::Dynamics;
-use crate::kinematics::JointPath;
 
 /// The way to the new feed is found to this share of it.
 const WAY_SHARE: f64 = 0.01;
@@ -80,11 +79,11 @@ impl Continuous {
         self.regime.from_lu
     }
 
-    /// Where the law of the front piece ends.
-    pub fn front_end_lu(&self, path: &JointPath) -> f64 {
+    /// Where the law of the front piece ends; `None`: where the piece does.
+    pub fn front_end_lu(&self) -> Option<f64> {
         let place = self.places.front().filter(|place| self.refuge.is_none() && place.part_lu.is_none());
         let last = place.and_then(|place| self.chain.intervals.get(place.intervals.end.checked_sub(1)?));
-        last.map_or(path.length_lu(), |last| last.end_lu)
+        last.map(|last| last.end_lu)
     }
 
     /// The front piece has come so far when something changes.

@@ -21,8 +21,9 @@ struct Row {
     holds: bool,
     slack: f64,
     multiplier: f64,
-    /// 1/slack and multiplier/slack at the present point.
+    /// 1/slack, 1/multiplier and multiplier/slack at the present point.
     inverse: f64,
+    multiplier_inverse: f64,
     weight: f64,
     residual: f64,
     slack_step: f64,
@@ -72,6 +73,7 @@ impl Problem {
             slack: 0.0,
             multiplier: 0.0,
             inverse: 0.0,
+            multiplier_inverse: 0.0,
             weight: 0.0,
             residual: 0.0,
             slack_step: 0.0,
@@ -261,9 +263,12 @@ impl Solver {
                 row.slack += step * row.slack_step;
                 row.multiplier += step * row.multiplier_step;
                 row.residual = row.bound - row.along(&node.state, node.control) - row.slack;
-                residual = residual.max(row.residual.abs());
-                total += row.slack * row.multiplier;
-                row.inverse = 1.0 / row.slack;
+                residual = greater(residual, row.residual.abs());
+                let product = row.slack * row.multiplier;
+                total += product;
+                let inverse = 1.0 / product;
+                row.inverse = row.multiplier * inverse;
+                row.multiplier_inverse = row.slack * inverse;
                 row.weight = row.multiplier * row.inverse;
                 let pull = -row.weight * row.residual;
                 let [a0, a1, a2] = row.a;
@@ -395,8 +400,8 @@ impl Solver {
                 row.slack_step = row.residual - row.along(&node.state_step, node.control_step);
                 row.multiplier_step =
                     (centring - row.correction) * row.inverse - row.multiplier - row.weight * row.slack_step;
-                primal = primal.max(-row.slack_step * row.inverse);
-                dual = dual.max(-row.multiplier_step / row.multiplier);
+                primal = greater(primal, -row.slack_step * row.inverse);
+                dual = greater(dual, -row.multiplier_step * row.multiplier_inverse);
             }
             first = problem.ends[i];
         }
@@ -418,8 +423,10 @@ struct Prediction {
 
 impl Prediction {
     fn take(&mut self, row: &Row, slack_step: f64, multiplier_step: f64) {
-        self.primal = self.primal.max(-slack_step * row.inverse);
-        self.dual = self.dual.max(-multiplier_step / row.multiplier);
+        let slack_share = slack_step * row.inverse;
+        self.primal = greater(self.primal, -slack_share);
+        // Here the multiplier's step is -multiplier - weight * slack step.
+        self.dual = greater(self.dual, 1.0 + slack_share);
         self.by_slack += row.multiplier * slack_step;
         self.by_multiplier += row.slack * multiplier_step;
         self.by_both += slack_step * multiplier_step;
@@ -430,6 +437,11 @@ impl Prediction {
         let (primal, dual) = (1.0 / self.primal.max(1.0), 1.0 / self.dual.max(1.0));
         gap + primal * self.by_slack + dual * self.by_multiplier + primal * dual * self.by_both
     }
+}
+
+/// The greater of two numbers in one instruction: `f64::max` also looks for NaN, which the gap shows anyway.
+fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 impl Row {

@@ -38,10 +38,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// A plan reaches this many stopping distances beyond the piece that asks for it, if the window does.
-const REACH_RATIO: f64 = 4.0;
+const REACH_RATIO: f64 = 8.0;
 
 /// Of a plan that ends in a stop which is not the program's, the last part is not kept: this many times the way from its last summit.
 const DISTURBED_RATIO: f64 = 1.6;
+
+/// One piece of so many is handed out at least before the next plan.
+const STALE_PIECES: usize = 20;
 
 /// Intervals of a plan at least, if the window has them.
 const REACH_INTERVALS: f64 = 24.0;
@@ -308,6 +311,10 @@ impl Continuous {
         let kept_lu = ways[count] - DISTURBED_RATIO * (ways[count] - ways[summit]);
         self.kept = ways.partition_point(|way_lu| *way_lu <= kept_lu).saturating_sub(1);
         self.disturbed = self.kept;
+        // Where all of a plan brakes, planning again for each piece would cost more than a window that is a little shorter.
+        let stale = self.places.len() / STALE_PIECES;
+        let stale = stale.checked_sub(1).and_then(|last| self.places.get(last));
+        self.kept = stale.map_or(self.kept, |place| self.kept.max(place.intervals.end));
     }
 }
 

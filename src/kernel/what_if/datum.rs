@@ -85,9 +85,12 @@ pub(super) fn behind(machine: &Machine, piece: &PlannedPiece, limit: Limit) -> V
             CornerRule::Overload => vec![of(AxisDatum::Acceleration), Some(Datum::Overload)],
         },
         LimitKind::LookAhead => vec![Some(Datum::LookAhead)],
-        LimitKind::Cycle | LimitKind::Dwell | LimitKind::InPosition | LimitKind::Positioning | LimitKind::Override => {
-            Vec::new()
-        }
+        LimitKind::Cycle
+        | LimitKind::Dwell
+        | LimitKind::InPosition
+        | LimitKind::Positioning
+        | LimitKind::Override
+        | LimitKind::Spindle => Vec::new(),
     };
     if blend && limit.kind != LimitKind::Feed && contour.modes.contour_tolerance_mm.is_none() {
         data.push(Some(Datum::ContourTolerance));
