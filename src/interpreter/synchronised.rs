@@ -11,7 +11,7 @@ use crate::base::AxisKind;
 use crate::base::units::{S_PER_MIN, rad_from_deg, ratio_from_percent};
 use crate::machine::TimeLawKind;
 use crate::program::syntax::{Binary, Expr, ExprKind, SystemName, Unary};
-use crate::program::{Columns, Outcome, Synchronised, mentions_main_run};
+use crate::program::{Columns, Fault, Outcome, Synchronised, codes, mentions_main_run};
 use std::sync::Arc;
 
 /// Highest $AC_OVR.
@@ -24,9 +24,15 @@ impl Interpreter {
             None => Some(Condition::Constant(true)),
             Some(condition) => self.condition(condition)?,
         };
-        let follows = self.machine.feed.time_law == TimeLawKind::Continuous;
-        let Some(condition) = condition.filter(|_| follows && !mentions_main_run(&action.override_percent)) else {
-            self.report_word(action.entry, &action.columns);
+        if self.machine.feed.time_law == TimeLawKind::SevenPhase {
+            self.report_action(
+                &action.columns,
+                "under the time law `seven-phase` the feed cannot change inside a block",
+            );
+            return Ok(());
+        }
+        let Some(condition) = condition.filter(|_| !mentions_main_run(&action.override_percent)) else {
+            self.report_action(&action.columns, "it asks for values that are not watched");
             return Ok(());
         };
         let percent = number(&action.override_percent, self)?.clamp(0.0, HIGHEST_PERCENT);
@@ -46,6 +52,15 @@ impl Interpreter {
         let ids: Arc<[u32]> = ids.into_iter().filter_map(|id| u32::try_from(id).ok()).collect();
         self.emit_function(vec![Event::CancelSynchronised(ids)], false);
         Ok(())
+    }
+
+    /// Reports an action on $AC_OVR that is not executed, each reason once a run.
+    fn report_action(&mut self, columns: &Columns, reason: &'static str) {
+        if self.first_report(reason) {
+            let message = format!("a synchronised action on $AC_OVR is not executed: {reason}");
+            let fault = Fault::new(codes::NOT_ACTED_ON, columns.clone(), message).label("known, but not acted on");
+            self.warn(*fault.help("docs/feed-and-axes.md says which conditions are watched, and under which time law"));
+        }
     }
 
     /// `None`: something in it cannot be watched.

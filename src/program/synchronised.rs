@@ -35,9 +35,7 @@ pub struct Synchronised {
     pub condition: Option<Expr>,
     /// $AC_OVR.
     pub override_percent: Expr,
-    /// The word that opens it, for what is not acted on.
-    pub entry: &'static NotActedOn,
-    /// Where that stands.
+    /// The word that opens it.
     pub columns: Columns,
 }
 
@@ -81,7 +79,7 @@ pub(super) fn synchronised(entry: &'static NotActedOn, columns: Columns, mut lex
         return None;
     }
     let override_percent = expression(lexer).ok()?;
-    lexer.at_end().then_some(Synchronised { id, cadence, condition, override_percent, entry, columns })
+    lexer.at_end().then_some(Synchronised { id, cadence, condition, override_percent, columns })
 }
 
 /// The numbers of CANCEL.

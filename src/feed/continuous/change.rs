@@ -105,6 +105,7 @@ impl Continuous {
 
     /// Plans again with a new override from where the front piece stands. `pieces` as for [`Continuous::plan`].
     pub fn change(&mut self, pieces: &mut [Piece<'_>], override_ratio: f64) -> Change {
+        self.stand_in_group();
         let start = self.start();
         let before = std::mem::replace(&mut self.regime.override_ratio, override_ratio);
         if start == Start::Rest {
@@ -130,6 +131,18 @@ impl Continuous {
         self.regime.override_ratio = before;
         self.kept = self.chain.intervals.len();
         Change::NotYet
+    }
+
+    /// A piece that shares an interval with those before it begins inside that.
+    fn stand_in_group(&mut self) {
+        let Some(place) = self.places.front().filter(|_| self.regime.point.is_none() && self.refuge.is_none()) else {
+            return;
+        };
+        if let Some([from_lu, _]) = place.part_lu.filter(|[from_lu, _]| *from_lu > 0.0) {
+            let index = place.intervals.start;
+            let share = from_lu / self.chain.intervals[index].length_lu();
+            self.regime.point = Some(self.profile.inside(&self.chain, index, share).0);
+        }
     }
 
     /// At rest: no plan before matters.

@@ -32,6 +32,14 @@ impl Profile {
         (PathPoint { speed_squared_lu2_s2: b, slope_lu_s2: point.slope_lu_s2 + x * bend }, bend)
     }
 
+    /// b stays above 0 between the ends of an interval: the parabola may dip below it where the path slows down at the start and speeds up at the end.
+    fn goes_on(&self, chain: &Chain, index: usize) -> bool {
+        let (from, bend) = (self.points[index], self.bends_per_s2[index]);
+        let to_slope = from.slope_lu_s2 + bend * chain.intervals[index].length_lu();
+        let dips = bend > 0.0 && from.slope_lu_s2 < 0.0 && to_slope > 0.0;
+        !dips || from.speed_squared_lu2_s2 > 0.5 * from.slope_lu_s2 * from.slope_lu_s2 / bend
+    }
+
     /// What holds the speed in an interval: of the limits what is used most at its middle, of the junctions at its ends what is reached.
     pub fn limit(&self, chain: &Chain, index: usize) -> Limit {
         let interval = &chain.intervals[index];
@@ -87,6 +95,9 @@ fn demands(bound: &AxisBound, state: &Derivatives, point: &PathPoint, bend_per_s
 /// number.
 fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
     let interval = &chain.intervals[index];
+    if !profile.goes_on(chain, index) {
+        return f64::NAN;
+    }
     if interval.is_straight() {
         return used_straight(interval, profile, chain, index);
     }

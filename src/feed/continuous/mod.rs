@@ -163,7 +163,9 @@ impl Continuous {
     /// A new plan, if there is one.
     fn lay(&mut self, pieces: &mut [Piece<'_>]) -> bool {
         let start = self.start();
-        let known = self.known().min(pieces.len().saturating_sub(1));
+        // From inside the front everything is cut again.
+        let known = if self.regime.point.is_some() { 0 } else { self.known() };
+        let known = known.min(pieces.len().saturating_sub(1));
         let count = self.reach(pieces, known, start);
         let pieces = &mut pieces[..count];
         let mut layout = self.layout(pieces, known, start);
