@@ -14,6 +14,8 @@ pub(super) struct Section {
     forward_ratio: [f64; 3],
     /// a1, a2.
     back_ratio: [f64; 2],
+    /// The input that has been for ever: the filter works on the difference to it, so that an axis at rest keeps its bits.
+    resting: f64,
     /// In the unit of the signal.
     memory: [f64; 2],
 }
@@ -44,14 +46,12 @@ impl Section {
             [square + slope + 1.0, 2.0 - 2.0 * square, square - slope + 1.0]
         };
         let (b, a) = (polynomial(numerator), polynomial(denominator));
-        let mut section = Self {
+        Some(Self {
             forward_ratio: b.map(|value| value / a[0]),
             back_ratio: [a[1] / a[0], a[2] / a[0]],
+            resting,
             memory: [0.0; 2],
-        };
-        section.memory[1] = (section.forward_ratio[2] - section.back_ratio[1]) * resting;
-        section.memory[0] = (section.forward_ratio[1] - section.back_ratio[0]) * resting + section.memory[1];
-        Some(section)
+        })
     }
 
     /// Takes a sample, gives the filtered one.
@@ -59,10 +59,11 @@ impl Section {
     pub(super) fn step(&mut self, sample: f64) -> f64 {
         let [b0, b1, b2] = self.forward_ratio;
         let [a1, a2] = self.back_ratio;
-        let filtered = b0 * sample + self.memory[0];
-        self.memory[0] = b1 * sample - a1 * filtered + self.memory[1];
-        self.memory[1] = b2 * sample - a2 * filtered;
-        filtered
+        let above = sample - self.resting;
+        let filtered = b0 * above + self.memory[0];
+        self.memory[0] = b1 * above - a1 * filtered + self.memory[1];
+        self.memory[1] = b2 * above - a2 * filtered;
+        self.resting + filtered
     }
 }
 
@@ -80,10 +81,5 @@ impl Chain {
     #[inline(always)]
     pub(super) fn step(&mut self, sample: f64) -> f64 {
         self.0.iter_mut().fold(sample, |sample, section| section.step(sample))
-    }
-
-    /// No section is on.
-    pub(super) fn is_wire(&self) -> bool {
-        self.0.is_empty()
     }
 }
