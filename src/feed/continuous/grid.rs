@@ -20,8 +20,9 @@ const SHORT_STEP_SHARE: f64 = 0.04;
 /// Away from the ends of a piece an interval takes at most this share of the time to the nearer end.
 const GROWTH_SHARE: f64 = 0.3;
 
-/// The middle alone says too little about a curve.
-const POLYNOMIAL_CUTS: u32 = 1;
+/// The middle alone says too little about a curve; polynomials are cut at their nodes anyway, once at least.
+const POLYNOMIAL_CUTS: u32 = 0;
+const POLYNOMIAL_BLEND_CUTS: u32 = 1;
 const MAPPED_CUTS: u32 = 1;
 const BLEND_CUTS: u32 = 2;
 
@@ -208,7 +209,8 @@ impl<'a> Cutter<'a> {
         }
         let inside = [borders[borders.len() - 1], to_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
         let knots: Vec<f64> = match self.path.contour.curve() {
-            Some(Curve::Polynomial(curve)) if self.path.is_contour() => curve.knots_lu().collect(),
+            // Also where the quadrature had to be cut: there the curve changes most, if only over a thousandth of it.
+            Some(Curve::Polynomial(curve)) if self.path.is_contour() => curve.nodes_lu().collect(),
             _ if self.path.is_contour() => Vec::new(),
             _ => self.path.nodes_lu(),
         };
@@ -266,7 +268,13 @@ impl<'a> Cutter<'a> {
         match self.path.contour.curve() {
             _ if !self.path.is_contour() => MAPPED_CUTS,
             Some(Curve::Line(_) | Curve::Arc(_) | Curve::SpatialArc(_)) | None => 0,
-            Some(Curve::Polynomial(_)) if !self.blend => POLYNOMIAL_CUTS,
+            Some(Curve::Polynomial(_)) => {
+                if self.blend {
+                    POLYNOMIAL_BLEND_CUTS
+                } else {
+                    POLYNOMIAL_CUTS
+                }
+            }
             Some(_) => BLEND_CUTS,
         }
     }

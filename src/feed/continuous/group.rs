@@ -8,6 +8,7 @@
 //! Does not plan.
 
 use super::Piece;
+use super::chain::PathPoint;
 use super::grid::{constant_speed_lu_s, throughout};
 use super::interval::{Bounds, Derivatives, FASTER_MAX_RATIO, Interval, Tangent};
 use crate::base::PerAxis;
@@ -22,6 +23,10 @@ const TURN_MAX_RATIO: f64 = 0.02;
 /// Steps of direction, of curvature and of its rate at the joints of one interval: rounding, and shares of acceleration and jerk.
 const KINK_MAX_RATIO: f64 = 1e-7;
 const STEP_MAX_RATIO: [f64; 2] = [0.003, 0.02];
+
+/// How far rounding may carry a speed squared above what is allowed, and the smallest part that an interval is cut into for its first state.
+const CAP_ROUNDING_RATIO: f64 = 1e-9;
+const FITTING_MIN_RATIO: f64 = 1.0 / 1024.0;
 
 /// Pieces of one interval at most.
 const PIECES_MAX: usize = 64;
@@ -84,9 +89,15 @@ impl Brief {
     }
 }
 
-/// The stretches of `pieces[from..]`. `speeds_lu_s`: [`border_speeds`] of the same; `cut_first`, `cut_last`: the first and the last piece are not part of an
-/// interval.
-pub(super) fn stretches(pieces: &[Piece<'_>], from: usize, speeds_lu_s: &[f64], cut_first: bool) -> Vec<Stretch> {
+/// The stretches of `pieces[from..]`. `speeds_lu_s`: [`border_speeds`] of the same; `cut_first`: the first piece is not part of an interval, as the last one
+/// never is; `entry`: the state that the first piece begins with, if it moves.
+pub(super) fn stretches(
+    pieces: &[Piece<'_>],
+    from: usize,
+    speeds_lu_s: &[f64],
+    cut_first: bool,
+    entry: Option<PathPoint>,
+) -> Vec<Stretch> {
     let mut stretches = Vec::new();
     let mut first = from;
     while first < pieces.len() {
@@ -94,6 +105,9 @@ pub(super) fn stretches(pieces: &[Piece<'_>], from: usize, speeds_lu_s: &[f64], 
         let count =
             if last || (cut_first && first == 0) { 0 } else { together(pieces, first, &speeds_lu_s[first - from..]) };
         let (stretch, count) = match joined(pieces, first, count) {
+            Some((interval, _)) if first == 0 && entry.is_some_and(|entry| fitting_ratio(&entry, &interval) < 1.0) => {
+                (Stretch::Cut, 1)
+            }
             Some((interval, count)) => (Stretch::Group(count, Box::new(interval)), count),
             None => (Stretch::Cut, 1),
         };
@@ -101,6 +115,18 @@ pub(super) fn stretches(pieces: &[Piece<'_>], from: usize, speeds_lu_s: &[f64], 
         first += count;
     }
     stretches
+}
+
+/// How much of an interval may begin with a state: half of it later the speed squared, going on as it does, is still within what feed and axes
+/// allow. With less than all of it the interval has to be cut. A state that is too fast already is another matter.
+pub(super) fn fitting_ratio(entry: &PathPoint, interval: &Interval) -> f64 {
+    let (b, slope) = (entry.speed_squared_lu2_s2, entry.slope_lu_s2);
+    let cap = interval.cap.velocity_lu_s * interval.cap.velocity_lu_s * (1.0 + CAP_ROUNDING_RATIO);
+    let mut ratio = 1.0;
+    while b < cap && b + 0.5 * ratio * interval.length_lu() * slope > cap && ratio > FITTING_MIN_RATIO {
+        ratio *= 0.5;
+    }
+    ratio
 }
 
 /// Speeds at the starts of `pieces[from..]` and at the end, about: from `entry_lu_s` they rise, before the stop at the end they fall, and so they do

@@ -5,8 +5,8 @@
 //! Does not plan.
 
 use super::Piece;
-use super::chain::{Chain, Junction};
-use super::group::Stretch;
+use super::chain::{Chain, Junction, PathPoint};
+use super::group::{Stretch, fitting_ratio};
 use super::interval::Interval;
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -41,6 +41,8 @@ pub(super) struct Layout {
     pub owners: Vec<usize>,
     /// Intervals from here on are there for the stop at the end only.
     pub uncut: usize,
+    /// The state that the chain begins with, if it moves and its first piece is not known yet.
+    pub entry: Option<PathPoint>,
 }
 
 impl Layout {
@@ -139,6 +141,14 @@ impl Layout {
             let h = interval.length_lu();
             if cut_first && index == 0 {
                 borders.extend(CUTS_RATIO.map(|ratio| interval.start_lu + ratio * h));
+            }
+            let fitting =
+                self.entry.filter(|_| start == 0 && index == 0).map_or(1.0, |entry| fitting_ratio(&entry, interval));
+            if fitting < 1.0 && !(cut_first && index == 0) {
+                borders.push(interval.start_lu);
+                let parts =
+                    std::iter::successors(Some(fitting), |ratio| Some(2.0 * ratio)).take_while(|ratio| *ratio <= 1.0);
+                borders.extend(parts.map(|ratio| interval.start_lu + ratio * h));
             }
             if cut_last && index + 1 == count {
                 let from = borders.pop().unwrap_or(interval.start_lu);

@@ -187,7 +187,11 @@ impl Continuous {
         };
         let speeds_lu_s = group::border_speeds(pieces, known, entry_lu2_s2.sqrt());
         let cut_first = start == Start::Rest || self.regime.from_lu > 0.0;
-        let stretches = group::stretches(pieces, known, &speeds_lu_s, cut_first);
+        let entry = match start {
+            Start::At(point) if known == 0 => Some(point),
+            _ => None,
+        };
+        let stretches = group::stretches(pieces, known, &speeds_lu_s, cut_first, entry);
         let mut first = known;
         for stretch in &stretches {
             if let Stretch::Cut = stretch {
@@ -196,6 +200,7 @@ impl Continuous {
             first += stretch.pieces();
         }
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
+        layout.entry = entry;
         layout.extend(pieces, known, stretches, start == Start::Rest);
         if self.regime.from_lu > 0.0 && known == 0 {
             layout.frees_start();
