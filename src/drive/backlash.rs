@@ -2,7 +2,7 @@
 //!
 //! In: the position of the motor on the load side. Out: that of the load, which the motor drags along at either end of the play.
 //! The load has no inertia of its own here and stays where it was left (its friction holds it): that is the play of a screw
-//! measured by hand. What oscillates is the business of `two_mass`.
+//! measured by hand. A load that swings behind its play is not modelled.
 
 /// The play operator.
 #[derive(Clone, Debug)]
