@@ -12,15 +12,19 @@
 //! picture, law and code side by side.
 
 mod axis_drive;
+mod backlash;
 mod choice;
 mod current_loop;
 mod delay;
 mod encoder;
 mod feedforward;
+mod filter;
 mod ideal;
+mod jerk_filter;
 mod limit;
 mod plant;
 mod position_loop;
+mod reversal;
 mod speed_loop;
 mod transition;
 mod wire;
