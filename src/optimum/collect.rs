@@ -4,11 +4,12 @@
 //! where their direction or curvature steps. Does not solve.
 
 use super::{NoOptimum, Optimum};
-use crate::feed::{PathRules, PieceRules, PlannedPiece};
+use crate::feed::{PathRules, PieceRules, PlannedPiece, TimeLaw};
 use crate::geometry::Curve;
 use crate::kinematics::JointPath;
 use crate::machine::Machine;
 use crate::smoothing::{ContourPiece, PieceKind};
+use std::sync::Arc;
 
 /// Takes the path of a program.
 #[derive(Clone, Debug)]
@@ -32,6 +33,8 @@ pub(super) struct Piece {
     pub path: JointPath,
     pub length_lu: f64,
     pub rules: PieceRules,
+    /// As the control drives it: the law of the whole piece, and where in it this one begins.
+    pub driven: (Arc<TimeLaw>, f64),
 }
 
 impl Collector {
@@ -44,7 +47,13 @@ impl Collector {
     pub fn push(&mut self, planned: &PlannedPiece) {
         let path = &planned.path;
         if path.contour.curve().is_some() {
-            smooth(path).into_iter().for_each(|path| self.add(path));
+            let law = Arc::new(planned.law.clone());
+            let mut from_lu = 0.0;
+            for part in smooth(path) {
+                let length_lu = part.length_lu();
+                self.add(part, (law.clone(), from_lu));
+                from_lu += length_lu;
+            }
         } else if planned.law.duration_s() > 0.0 {
             self.rest();
             self.parts.push(Part::Rests { time_s: planned.law.duration_s() });
@@ -65,12 +74,12 @@ impl Collector {
         }
     }
 
-    fn add(&mut self, path: JointPath) {
+    fn add(&mut self, path: JointPath, driven: (Arc<TimeLaw>, f64)) {
         let Some(rules) = self.rules.piece(&path) else { return };
         if rules.junction_lu_s <= 0.0 {
             self.end_motion();
         }
-        self.motion.push(Piece { length_lu: path.length_lu(), path, rules });
+        self.motion.push(Piece { length_lu: path.length_lu(), path, rules, driven });
     }
 
     /// The path ends here: the fastest motion along it. `progress` hears how many of how many pieces are done.
@@ -79,6 +88,29 @@ impl Collector {
         solve(self.parts, progress)
     }
 }
+
+impl Piece {
+    /// v² and its slope along s as the control drives it.
+    #[cfg(feature = "optimal")]
+    pub(super) fn driven_at(&self, s_lu: f64) -> [f64; 2] {
+        let (law, from_lu) = &self.driven;
+        let place_lu = from_lu + s_lu;
+        let phases = law.phases();
+        let index = phases.partition_point(|phase| phase.start_lu <= place_lu).saturating_sub(1);
+        let Some(phase) = phases.get(index) else { return [0.0; 2] };
+        let (mut low_s, mut high_s) = (0.0, phase.duration_s);
+        for _ in 0..HALVINGS {
+            let middle_s = 0.5 * (low_s + high_s);
+            if phase.at(middle_s).position_lu < place_lu { low_s = middle_s } else { high_s = middle_s }
+        }
+        let state = phase.at(0.5 * (low_s + high_s));
+        [state.velocity_lu_s * state.velocity_lu_s, 2.0 * state.acceleration_lu_s2]
+    }
+}
+
+/// Of a phase, to find the time at which it is at a place.
+#[cfg(feature = "optimal")]
+const HALVINGS: usize = 50;
 
 /// The parts of a piece on which direction and curvature are continuous.
 fn smooth(path: &JointPath) -> Vec<JointPath> {

@@ -57,7 +57,7 @@ impl Problem {
         }
     }
 
-    /// The least cost; `None` if the method finds none.
+    /// The least cost, or what the method was left with: the caller looks at it. `None` if it finds none.
     pub(super) fn solve(self) -> Option<Vec<f64>> {
         let rows = self.right.len();
         let cost =
@@ -73,6 +73,7 @@ impl Problem {
             SolverStatus::Solved
                 | SolverStatus::AlmostSolved
                 | SolverStatus::InsufficientProgress
+                | SolverStatus::NumericalError
                 | SolverStatus::MaxIterations
         );
         let found = std::mem::take(&mut solver.solution.x);

@@ -29,6 +29,14 @@ pub(super) const POINTS_RATIO: [f64; 3] = [0.0, 0.5, 1.0];
 /// Places between them at which only the speed is looked at.
 pub(super) const BETWEEN_RATIO: [f64; 2] = [0.25, 0.75];
 
+/// The third derivative may step between two intervals: their ends are looked at from inside.
+const INSIDE_RATIO: f64 = 1e-6;
+
+/// A share of an interval that is not its end.
+pub(super) fn inside(ratio: f64) -> f64 {
+    ratio.clamp(INSIDE_RATIO, 1.0 - INSIDE_RATIO)
+}
+
 /// What does not move an axis: less than this per unit of s.
 const STILL_RATIO: f64 = 1e-14;
 
@@ -214,7 +222,7 @@ impl Grid {
 impl Interval {
     fn new(pieces: &[Piece], index: usize, from_lu: f64, start_lu: f64, length_lu: f64) -> Self {
         let piece = &pieces[index];
-        let points = POINTS_RATIO.map(|ratio| piece.point(from_lu + ratio * length_lu));
+        let points = POINTS_RATIO.map(|ratio| piece.point(from_lu + inside(ratio) * length_lu));
         let square_max_between = BETWEEN_RATIO.map(|ratio| piece.point(from_lu + ratio * length_lu).square_max);
         Self { piece: index, from_lu, place_lu: start_lu + from_lu, length_lu, points, square_max_between }
     }

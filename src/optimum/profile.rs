@@ -4,16 +4,19 @@
 //! solve.
 
 use super::collect::Piece;
-use super::grid::{Grid, Interval, PathPoint};
+use super::grid::{Grid, Interval, POINTS_RATIO, PathPoint, inside};
 
-/// b and b' at every place between two intervals and at both ends.
+/// b and b' at every place between two intervals and at both ends, b'' at the start and the end of every interval.
+///
+/// (b'' would follow from b and b', as a small difference times a large factor where intervals are short.)
 #[derive(Clone, Debug)]
 pub(super) struct Profile {
     pub squares: Vec<f64>,
     pub slopes: Vec<f64>,
+    pub bends: Vec<[f64; 2]>,
 }
 
-/// Weights of (b0, b0', b1, b1') of an interval for b, b' and b'' at a place in it.
+/// Weights of (b0, b0', b0'', b1'') of an interval for b, b' and b'' at a place in it.
 pub(super) type Weights = [[f64; 4]; 3];
 
 /// Nodes and weights of the five-point rule of Gauss and Legendre on 0 .. 1.
@@ -32,9 +35,9 @@ const SQUARE_MIN_RATIO: f64 = 1e-9;
 pub(super) fn weights(ratio: f64, h: f64) -> Weights {
     let (t, t2, t3) = (ratio, ratio * ratio, ratio * ratio * ratio);
     [
-        [2.0 * t3 - 3.0 * t2 + 1.0, (t3 - 2.0 * t2 + t) * h, 3.0 * t2 - 2.0 * t3, (t3 - t2) * h],
-        [(6.0 * t2 - 6.0 * t) / h, 3.0 * t2 - 4.0 * t + 1.0, (6.0 * t - 6.0 * t2) / h, 3.0 * t2 - 2.0 * t],
-        [(12.0 * t - 6.0) / (h * h), (6.0 * t - 4.0) / h, (6.0 - 12.0 * t) / (h * h), (6.0 * t - 2.0) / h],
+        [1.0, t * h, h * h * (t2 / 2.0 - t3 / 6.0), h * h * t3 / 6.0],
+        [0.0, 1.0, h * (t - t2 / 2.0), h * t2 / 2.0],
+        [0.0, 0.0, 1.0 - t, t],
     ]
 }
 
@@ -75,9 +78,22 @@ impl Used {
 }
 
 impl Profile {
+    /// The cubics with these values and slopes.
+    pub(super) fn new(grid: &Grid, squares: Vec<f64>, slopes: Vec<f64>) -> Self {
+        let bends = grid.intervals.iter().enumerate().map(|(i, interval)| {
+            let h = interval.length_lu;
+            let chord = (squares[i + 1] - squares[i]) / h;
+            let [m, n] = [slopes[i], slopes[i + 1]];
+            [(6.0 * chord - 4.0 * m - 2.0 * n) / h, (2.0 * m + 4.0 * n - 6.0 * chord) / h]
+        });
+        let bends = bends.collect();
+        Self { squares, slopes, bends }
+    }
+
     /// b, b' and b'' at a share of an interval.
     pub(super) fn at(&self, grid: &Grid, index: usize, ratio: f64) -> [f64; 3] {
-        let nodes = [self.squares[index], self.slopes[index], self.squares[index + 1], self.slopes[index + 1]];
+        let [first, last] = self.bends[index];
+        let nodes = [self.squares[index], self.slopes[index], first, last];
         weights(ratio, grid.intervals[index].length_lu).map(|row| row.iter().zip(nodes).map(|(w, x)| w * x).sum())
     }
 
@@ -100,23 +116,48 @@ impl Profile {
         let Interval { piece, from_lu, length_lu, .. } = &grid.intervals[index];
         let look = |i: usize| {
             let ratio = i as f64 / places as f64;
-            Used::at(&pieces[*piece].point(from_lu + ratio * length_lu), self.at(grid, index, ratio))
+            Used::at(&pieces[*piece].point(from_lu + inside(ratio) * length_lu), self.at(grid, index, ratio))
         };
         (0..=places).map(look).fold(Used::default(), Used::most)
     }
 
+    /// By how much time has to be stretched so that all limits hold at the places of the grid; infinite where the speed is no number.
+    pub(super) fn stretch_ratio(&self, grid: &Grid) -> f64 {
+        let places = self.squares.iter().zip(&grid.square_max).map(|(square, most)| (square / most).sqrt());
+        let inside = (0..grid.intervals.len()).flat_map(|index| {
+            let points = POINTS_RATIO.iter().zip(&grid.intervals[index].points);
+            points.map(move |(ratio, point)| {
+                let state = self.at(grid, index, *ratio);
+                if state[0] > 0.0 { Used::at(point, state).stretch_ratio() } else { f64::INFINITY }
+            })
+        });
+        places.chain(inside).fold(1.0, |most, ratio| if ratio.is_nan() { f64::INFINITY } else { most.max(ratio) })
+    }
+
+    /// The same motion, slower.
+    pub(super) fn slowed(mut self, stretch_ratio: f64) -> Self {
+        let factor = 1.0 / (stretch_ratio * stretch_ratio);
+        let all = self.squares.iter_mut().chain(&mut self.slopes).chain(self.bends.as_flattened_mut());
+        all.for_each(|value| *value *= factor);
+        self
+    }
+
     /// The same motion on a grid with intervals cut in two.
     pub(super) fn refined(&self, grid: &Grid, cut: &[bool]) -> Self {
-        let (mut squares, mut slopes) = (vec![self.squares[0]], vec![self.slopes[0]]);
+        let (mut squares, mut slopes, mut bends) = (vec![self.squares[0]], vec![self.slopes[0]], Vec::new());
         for (i, cut) in cut.iter().enumerate() {
+            let [first, last] = self.bends[i];
             if *cut {
-                let [square, slope, _] = self.at(grid, i, 0.5);
+                let [square, slope, bend] = self.at(grid, i, 0.5);
                 squares.push(square);
                 slopes.push(slope);
+                bends.extend([[first, bend], [bend, last]]);
+            } else {
+                bends.push([first, last]);
             }
             squares.push(self.squares[i + 1]);
             slopes.push(self.slopes[i + 1]);
         }
-        Self { squares, slopes }
+        Self { squares, slopes, bends }
     }
 }

@@ -1,10 +1,11 @@
 //! The fastest motion between two rests: rounds on grids that get finer.
 //!
-//! In: the [`Part`]s of a path. Out: [`Optimum`]. The first motion is that of the second-order problem, cut down to what the jerk allows at
-//! constant speed; it may break the jerk limit, but what follows from it does not.
+//! In: the [`Part`]s of a path. Out: [`Optimum`]. Each round begins with a motion that keeps all limits, and ends with a faster one. The first
+//! motion is the control's, slowed until every limit holds at the places of the grid; or, where the control stands still on the way and where
+//! this one is faster, that of the second-order problem, cut down to what the jerk allows at constant speed and slowed likewise.
 
 use super::collect::{Part, Piece};
-use super::grid::Grid;
+use super::grid::{Grid, Interval};
 use super::profile::{Profile, Used};
 use super::{NoOptimum, OptimalMotion, Optimum, SpeedPlace, round};
 
@@ -13,7 +14,10 @@ const PIECES_MAX: usize = 5000;
 
 /// Rounds end where one gains less than this share of the time. On a refined grid a few are enough: it begins near its optimum.
 const ROUND_GAIN_RATIO: f64 = 1e-4;
-const FIRST_ROUNDS_MAX: usize = 15;
+const FIRST_ROUNDS_MAX: usize = 20;
+
+/// Rounds at first that look for more speed wherever there is some to gain, whatever the time says: the first motion may be far too slow.
+const FAR_ROUNDS: usize = 6;
 const ROUNDS_MAX: usize = 4;
 
 /// Grids end where one gains less than this share of the time.
@@ -59,37 +63,60 @@ struct Section<'a> {
     pieces: &'a [Piece],
     grid: Grid,
     profile: Profile,
+    /// The profile may be much slower than the optimum.
+    far: bool,
 }
 
 impl<'a> Section<'a> {
     fn new(pieces: &'a [Piece]) -> Self {
         let grid = Grid::new(pieces);
-        let profile = first_profile(&grid);
-        Self { pieces, grid, profile }
+        let slowed = |profile: Profile| {
+            let slow_ratio = profile.stretch_ratio(&grid);
+            let profile = profile.slowed(slow_ratio);
+            let time_s = profile.time_s(&grid);
+            (profile, if time_s.is_nan() { f64::INFINITY } else { time_s })
+        };
+        let driven = driven_profile(&grid, pieces);
+        let smooth = Profile::new(&grid, driven.squares.clone(), slopes(&grid, &driven.squares));
+        let (mut profile, mut time_s, mut far) = (driven.clone(), f64::INFINITY, false);
+        for (candidate, is_far) in [(driven, false), (smooth, true), (first_profile(&grid), true)] {
+            let (candidate, candidate_s) = slowed(candidate);
+            if candidate_s < time_s {
+                (profile, time_s, far) = (candidate, candidate_s, is_far);
+            }
+        }
+        Self { pieces, grid, profile, far }
     }
 
     fn solved(mut self, optimum: &mut Optimum, progress: &mut dyn FnMut()) -> Result<OptimalMotion, NoOptimum> {
         let mut grid_s = f64::INFINITY;
         for number in 0..GRIDS_MAX {
-            let mut time_s = f64::INFINITY;
-            for _ in 0..if number == 0 { FIRST_ROUNDS_MAX } else { ROUNDS_MAX } {
+            let slow_ratio = self.profile.stretch_ratio(&self.grid);
+            self.profile = self.profile.slowed(slow_ratio);
+            let mut time_s = self.profile.time_s(&self.grid);
+            if !time_s.is_finite() {
+                let line = self.pieces.first().map_or(0, |piece| piece.path.contour.block.line);
+                return Err(NoOptimum::NotSolved { line });
+            }
+            for count in 0..if number == 0 { FIRST_ROUNDS_MAX } else { ROUNDS_MAX } {
                 progress();
                 optimum.rounds += 1;
-                let Some(next) = round::solve(&self.grid, &self.profile) else { break };
+                let far = self.far && number == 0 && count < FAR_ROUNDS;
+                let Some(next) = round::solve(&self.grid, &self.profile, far) else { break };
+                // What the solver was left with may be a little off.
+                let slow_ratio = next.stretch_ratio(&self.grid);
+                let next = next.slowed(slow_ratio);
                 let next_s = next.time_s(&self.grid);
-                if !next_s.is_finite() {
+                let faster = next_s < time_s;
+                if !faster {
                     break;
                 }
                 self.profile = next;
                 let gained = time_s - next_s;
                 time_s = next_s;
-                if gained.abs() <= ROUND_GAIN_RATIO * time_s {
+                if !far && gained <= ROUND_GAIN_RATIO * time_s {
                     break;
                 }
-            }
-            if !time_s.is_finite() {
-                let line = self.pieces.first().map_or(0, |piece| piece.path.contour.block.line);
-                return Err(NoOptimum::NotSolved { line });
             }
             let gained = grid_s - time_s;
             grid_s = time_s;
@@ -108,13 +135,12 @@ impl<'a> Section<'a> {
     /// Intervals that exceed limits inside, and unless the time has converged those that leave limits unused.
     fn to_cut(&self, converged: bool) -> Vec<bool> {
         let cut = |index: usize| {
-            let between = [0.25, 0.75].map(|ratio| self.used_at(index, ratio));
-            let most = between[0].most(between[1]);
+            let eighths = (1..8).map(|i| self.used_at(index, f64::from(i) / 8.0));
+            let most = eighths.fold(Used::default(), Used::most);
             if most.velocity_ratio > EXCEEDED_VELOCITY_RATIO || most.largest() > EXCEEDED_RATIO {
                 return true;
             }
-            let middle = self.used_at(index, 0.5);
-            !converged && between.iter().chain([&middle]).any(|used| used.largest() < UNUSED_RATIO)
+            !converged && [0.25, 0.5, 0.75].iter().any(|ratio| self.used_at(index, *ratio).largest() < UNUSED_RATIO)
         };
         (0..self.grid.intervals.len()).map(cut).collect()
     }
@@ -127,7 +153,7 @@ impl<'a> Section<'a> {
 
     /// The motion, slowed by what it exceeds its limits between the places of the grid.
     fn motion(self) -> OptimalMotion {
-        let Self { pieces, grid, profile } = self;
+        let Self { pieces, grid, profile, .. } = self;
         let used = (0..grid.intervals.len()).map(|index| profile.used(&grid, pieces, index, CHECKED_PLACES));
         let stretch_ratio = used.fold(Used::default(), Used::most).stretch_ratio();
         let place = |index: usize| {
@@ -145,6 +171,23 @@ impl<'a> Section<'a> {
             path: pieces.iter().map(|piece| piece.path.clone()).collect(),
         }
     }
+}
+
+/// The motion of the control.
+fn driven_profile(grid: &Grid, pieces: &[Piece]) -> Profile {
+    let at = |interval: &Interval, inside_lu: f64| pieces[interval.piece].driven_at(interval.from_lu + inside_lu);
+    let starts = grid.intervals.iter().map(|interval| at(interval, 0.0));
+    let end = grid.intervals.last().map(|last| at(last, last.length_lu));
+    let (squares, mut slopes): (Vec<f64>, Vec<f64>) = starts.chain(end).map(|[square, slope]| (square, slope)).unzip();
+    let last = squares.len() - 1;
+    [slopes[0], slopes[last]] = rest_slopes(grid, &squares);
+    Profile::new(grid, squares, slopes)
+}
+
+/// Slopes next to the rests.
+fn rest_slopes(grid: &Grid, squares: &[f64]) -> [f64; 2] {
+    let [first, last] = grid.rests.map(|rest| rest.exponent_ratio / rest.length_lu);
+    [first * squares[0], -last * squares[squares.len() - 1]]
 }
 
 /// The fastest motion without a limit of jerk, below the speeds that the jerk allows where they are constant.
@@ -178,5 +221,22 @@ fn first_profile(grid: &Grid) -> Profile {
     for i in (0..count - 1).rev() {
         squares[i] = squares[i].min(squares[i + 1] + slope_max(i) * grid.intervals[i].length_lu);
     }
-    Profile { slopes: vec![0.0; count], squares }
+    let slopes = slopes(grid, &squares);
+    Profile::new(grid, squares, slopes)
+}
+
+/// Slopes with which the cubics between the places do not wave: the harmonic mean of those on either side, 0 at a summit or a valley.
+fn slopes(grid: &Grid, squares: &[f64]) -> Vec<f64> {
+    let chord = |index: usize| (squares[index + 1] - squares[index]) / grid.intervals[index].length_lu;
+    let last = squares.len() - 1;
+    (0..=last)
+        .map(|place| match place {
+            0 => rest_slopes(grid, squares)[0],
+            _ if place == last => rest_slopes(grid, squares)[1],
+            _ => {
+                let (before, after) = (chord(place - 1), chord(place));
+                if before * after > 0.0 { 2.0 * before * after / (before + after) } else { 0.0 }
+            }
+        })
+        .collect()
 }
