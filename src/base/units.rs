@@ -8,6 +8,7 @@
 //! | `_rad`, `_rad_s`, `_rad_s2`, `_rad_s3` | the same for a rotary axis or a motor |
 //! | `_lu`, `_lu_s`, `_lu_s2`, `_lu_s3` | "length unit of the axis": mm for a linear axis, rad for a rotary one |
 //! | `_s`, `_ms`, `_us`, `_ns` | time |
+//! | `_hz` | frequency: borders and filters |
 //! | `_deg`, `_deg_s`, `_rpm`, `_rot`, `_rot_s2`, `_rot_s3` | customary units of rotation: borders only |
 //! | `_um`, `_m`, `_m_min`, `_m_s2`, `_m_s3`, `_mm_min`, `_inch`, `_mh` | other customary units: borders only |
 //! | `_n_m`, `_kg_m2`, `_a`, `_v`, `_ohm`, `_h` | torque, inertia, current, voltage, resistance, inductance |

@@ -4,15 +4,18 @@
 //! computing delay on the state sampled at the start of the tick. Does not check its data (`machine` does), nor the set-point
 //! against the limits of the axis: a set-point that is too fast saturates, is flagged, and recovers.
 
+use super::backlash::Backlash;
 use super::current_loop::{CurrentLoop, VoltageCommand};
 use super::encoder::{MotorEncoder, PositionEncoder};
 use super::feedforward::{Feedforward, Terms};
+use super::jerk_filter::JerkFilter;
 use super::plant::{Plant, PlantState};
 use super::position_loop::{PositionLoop, SpeedCommand};
+use super::reversal::{Correction, Reversal};
 use super::speed_loop::{SpeedLoop, TorqueCommand};
 use super::wire::{AxisSignals, Start, flags};
 use crate::base::TimeBase;
-use crate::machine::Axis;
+use crate::machine::{Axis, PositionSource};
 
 /// What a drive gets in one position cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +31,9 @@ pub struct DriveInput {
 /// Drive, motor and mechanics of one axis. Holds all of its state: a clone is a snapshot.
 #[derive(Clone, Debug)]
 pub struct AxisDrive {
+    jerk_filter: JerkFilter,
     feedforward: Feedforward,
+    reversal: Reversal,
     position_encoder: PositionEncoder,
     position_loop: PositionLoop,
     motor_encoder: MotorEncoder,
@@ -36,6 +41,13 @@ pub struct AxisDrive {
     current_loop: CurrentLoop,
     plant: Plant,
     state: PlantState,
+    backlash: Option<Backlash>,
+    /// MD31040 = 0: the position is that of the motor.
+    motor_measures: bool,
+    /// MD32640.
+    stiffness_control: bool,
+    /// x_ref of the position cycle before.
+    reference_before_lu: f64,
     /// r.
     transmission_lu_per_rad: f64,
     /// n_p = T_p / T_v.
@@ -46,12 +58,21 @@ pub struct AxisDrive {
     current_mean_a: f64,
 }
 
+/// Wires around the position loop.
+#[derive(Clone, Copy)]
+struct Position {
+    /// x_ref.
+    reference_lu: f64,
+    /// x_meas.
+    measured_lu: f64,
+    command: SpeedCommand,
+}
+
 /// All wires at one tick, by the box that drives them.
 struct Wires {
     input: DriveInput,
     terms: Terms,
-    measured_lu: f64,
-    speed: SpeedCommand,
+    position: Position,
     torque: TorqueCommand,
     gravity_n_m: f64,
     voltage: VoltageCommand,
@@ -74,7 +95,9 @@ impl AxisDrive {
         };
         let current_a = torque_n_m / data.motor.torque_constant_n_m_per_a;
         Some(Self {
+            jerk_filter: JerkFilter::new(&data.options.jerk_filter, position_period_s, position_lu),
             feedforward: Feedforward::new(data, position_period_s, position_lu),
+            reversal: Reversal::new(&data.options, position_period_s),
             position_encoder: PositionEncoder::new(data),
             position_loop: PositionLoop::new(data),
             motor_encoder: MotorEncoder::new(data, speed_period_s, angle_rad),
@@ -82,6 +105,10 @@ impl AxisDrive {
             current_loop: CurrentLoop::new(data, current_period_s, data.motor.resistance_ohm * current_a),
             plant,
             state: PlantState { current_a, speed_rad_s: 0.0, angle_rad },
+            backlash: Backlash::new(data.mechanics.backlash_lu, position_lu),
+            motor_measures: data.encoder.position_source == PositionSource::Motor,
+            stiffness_control: data.options.stiffness_control,
+            reference_before_lu: position_lu,
             transmission_lu_per_rad,
             speed_ticks: whole_ratio(data.position_cycle_ticks, data.speed_cycle_ticks),
             current_ticks: whole_ratio(data.speed_cycle_ticks, data.current_cycle_ticks),
@@ -108,27 +135,65 @@ impl AxisDrive {
     /// The diagram, from left to right.
     #[inline(always)]
     fn cycle(&mut self, input: DriveInput, mut observe: impl FnMut(u32, &Self, &Wires)) {
-        let position_lu = self.transmission_lu_per_rad * self.state.angle_rad;
-        let measured_lu = self.position_encoder.measured_lu(position_lu);
-        let terms = self.feedforward.terms(input.position_setpoint_lu, input.feedforward_active);
-        let speed = self.position_loop.step(terms.reference_lu, measured_lu, terms.velocity_lu_s);
+        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
+        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
+        let correction = self.reversal.step(terms.set_velocity_lu_s);
+        let mut position = self.position_control(terms.reference_lu, &terms, &correction);
 
         let mut tick = 0;
         let mut current_sum_a = 0.0;
-        for _ in 0..self.speed_ticks {
+        for speed_tick in 0..self.speed_ticks {
+            if self.stiffness_control {
+                position = self.position_control(self.reference_lu(speed_tick, &terms), &terms, &correction);
+            }
             let measured_rad_s = self.motor_encoder.measured_speed_rad_s(self.state);
-            let torque = self.speed_loop.step(speed.motor_speed_rad_s - measured_rad_s, terms.torque_n_m);
+            let speed_rad_s = position.command.motor_speed_rad_s;
+            let torque = self.speed_loop.step(speed_rad_s, measured_rad_s, terms.torque_n_m);
 
             for _ in 0..self.current_ticks {
                 let voltage = self.current_loop.step(torque.current_a - self.state.current_a);
                 let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
-                observe(tick, self, &Wires { input, terms, measured_lu, speed, torque, gravity_n_m, voltage });
+                observe(tick, self, &Wires { input, terms, position, torque, gravity_n_m, voltage });
                 current_sum_a += self.state.current_a;
                 self.state = self.plant.step(self.state, voltage.voltage_v, gravity_n_m);
+                if let Some(backlash) = &mut self.backlash {
+                    backlash.follow(self.transmission_lu_per_rad * self.state.angle_rad);
+                }
                 tick += 1;
             }
         }
+        self.reference_before_lu = terms.reference_lu;
         self.current_mean_a = current_sum_a / f64::from(tick);
+    }
+
+    /// Encoder, position loop and what is added to its output.
+    #[inline(always)]
+    fn position_control(&self, reference_lu: f64, terms: &Terms, correction: &Correction) -> Position {
+        let from_lu = if self.motor_measures { self.motor_lu() } else { self.load_lu() };
+        let measured_lu = self.position_encoder.measured_lu(from_lu) + correction.position_lu;
+        let added_lu_s = terms.velocity_lu_s + correction.velocity_lu_s;
+        Position { reference_lu, measured_lu, command: self.position_loop.step(reference_lu, measured_lu, added_lu_s) }
+    }
+
+    /// DSC: the reference on its way from that of the cycle before to that of this one, which it reaches in the last speed cycle.
+    fn reference_lu(&self, speed_tick: u32, terms: &Terms) -> f64 {
+        let left_ratio = f64::from(self.speed_ticks - 1 - speed_tick) / f64::from(self.speed_ticks);
+        terms.reference_lu + left_ratio * (self.reference_before_lu - terms.reference_lu)
+    }
+
+    /// r th: the motor on the load side.
+    #[inline(always)]
+    fn motor_lu(&self) -> f64 {
+        self.transmission_lu_per_rad * self.state.angle_rad
+    }
+
+    /// x: where the load is.
+    #[inline(always)]
+    fn load_lu(&self) -> f64 {
+        match &self.backlash {
+            Some(backlash) => backlash.load_lu(),
+            None => self.motor_lu(),
+        }
     }
 
     /// False once the axis has diverged: a set-point that was not a number, or gains so high that the sampled loop is unstable
@@ -159,8 +224,8 @@ impl AxisDrive {
 
     /// The wires in the units of the load side.
     fn signals(&self, wires: &Wires) -> AxisSignals {
-        let Wires { input, terms, measured_lu, speed, torque, gravity_n_m, voltage } = wires;
-        let position_lu = self.transmission_lu_per_rad * self.state.angle_rad;
+        let Wires { input, terms, position, torque, gravity_n_m, voltage } = wires;
+        let (speed, position_lu) = (&position.command, self.load_lu());
         let mut bits = 0;
         for (set, flag) in [
             (speed.clamped, flags::SPEED_CLAMP),
@@ -172,9 +237,9 @@ impl AxisDrive {
         }
         AxisSignals {
             position_setpoint_lu: input.position_setpoint_lu,
-            position_reference_lu: terms.reference_lu,
+            position_reference_lu: position.reference_lu,
             position_actual_lu: position_lu,
-            position_measured_lu: *measured_lu,
+            position_measured_lu: position.measured_lu,
             control_deviation_lu: speed.deviation_lu,
             following_error_lu: input.position_setpoint_lu - position_lu,
             velocity_command_lu_s: speed.velocity_lu_s,

@@ -1,10 +1,11 @@
 //! Set-point preparation: balancing delay, velocity and torque feed-forward (models/drive.md section 3).
 //!
 //! In: the set-point of a position cycle. Out: [`Terms`]: reference position, velocity feed-forward, torque feed-forward.
-//! Differences are backward ones: no look-ahead. The PT1 balancing of MD32810 (FFW_MODE 1, 2) is not modelled.
+//! Differences are backward ones: no look-ahead. The
+//! reference waits for the feed-forward by a dead time (FFW_MODE 3, 4) or in a filter of first order (1, 2).
 
 use super::delay::DelayLine;
-use crate::machine::DriveData;
+use crate::machine::{Balancing, DriveData};
 
 /// What the loops get in one position cycle.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +16,39 @@ pub(super) struct Terms {
     pub(super) velocity_lu_s: f64,
     /// t_ff (TFFWS).
     pub(super) torque_n_m: f64,
+    /// v_raw.
+    pub(super) set_velocity_lu_s: f64,
+}
+
+/// The box between x_set and x_ref.
+#[derive(Clone, Debug)]
+enum Balance {
+    DeadTime(DelayLine),
+    /// T y' = x - y as backward Euler has it: a ramp comes out late by exactly T.
+    Pt1 {
+        share_ratio: f64,
+        reference_lu: f64,
+    },
+}
+
+impl Balance {
+    fn new(data: &DriveData, period_s: f64, position_lu: f64) -> Self {
+        let time_s = data.setpoint_delay_s;
+        match data.options.balancing {
+            Balancing::DeadTime => Self::DeadTime(DelayLine::new(time_s, period_s, position_lu)),
+            Balancing::Pt1 => Self::Pt1 { share_ratio: period_s / (time_s + period_s), reference_lu: position_lu },
+        }
+    }
+
+    fn step(&mut self, setpoint_lu: f64) -> f64 {
+        match self {
+            Self::DeadTime(line) => line.step(setpoint_lu),
+            Self::Pt1 { share_ratio, reference_lu } => {
+                *reference_lu += *share_ratio * (setpoint_lu - *reference_lu);
+                *reference_lu
+            }
+        }
+    }
 }
 
 /// The boxes "d/dt", "d²/dt²" and "delay".
@@ -27,7 +61,7 @@ pub(super) struct Feedforward {
     torque_by_acceleration_n_m_s2_per_lu: f64,
     setpoint_before_lu: f64,
     velocity_before_lu_s: f64,
-    setpoint_delay: DelayLine,
+    setpoint_balance: Balance,
     velocity_delay: DelayLine,
     acceleration_delay: DelayLine,
 }
@@ -42,7 +76,7 @@ impl Feedforward {
             torque_by_acceleration_n_m_s2_per_lu: inertia_kg_m2 / data.mechanics.transmission_lu_per_rad,
             setpoint_before_lu: position_lu,
             velocity_before_lu_s: 0.0,
-            setpoint_delay: DelayLine::new(data.setpoint_delay_s, period_s, position_lu),
+            setpoint_balance: Balance::new(data, period_s, position_lu),
             velocity_delay: DelayLine::new(data.feedforward_delay_s, period_s, 0.0),
             acceleration_delay: DelayLine::new(data.feedforward_delay_s, period_s, 0.0),
         }
@@ -56,13 +90,14 @@ impl Feedforward {
         self.setpoint_before_lu = setpoint_lu;
         self.velocity_before_lu_s = velocity_lu_s;
 
-        let reference_lu = self.setpoint_delay.step(setpoint_lu);
+        let set_velocity_lu_s = velocity_lu_s;
+        let reference_lu = self.setpoint_balance.step(setpoint_lu);
         let velocity_lu_s = self.velocity_delay.step(velocity_lu_s) * self.velocity_weight_ratio;
         let torque_n_m = self.acceleration_delay.step(acceleration_lu_s2) * self.torque_by_acceleration_n_m_s2_per_lu;
         if active {
-            Terms { reference_lu, velocity_lu_s, torque_n_m }
+            Terms { reference_lu, velocity_lu_s, torque_n_m, set_velocity_lu_s }
         } else {
-            Terms { reference_lu, velocity_lu_s: 0.0, torque_n_m: 0.0 }
+            Terms { reference_lu, velocity_lu_s: 0.0, torque_n_m: 0.0, set_velocity_lu_s }
         }
     }
 }

@@ -8,19 +8,24 @@
 //!        └─ feedforward: v_ff into the position loop's output, t_ff into the speed loop's output
 //! ```
 //!
-//! `axis_drive` wires the boxes; `choice` lets the kernel treat an axis without drive data (`ideal`) alike. `docs/drive.md` has
+//! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal` and
+//! `backlash`. `axis_drive` wires the boxes; `choice` lets the kernel treat an axis without drive data (`ideal`) alike. `docs/drive.md` has
 //! picture, law and code side by side.
 
 mod axis_drive;
+mod backlash;
 mod choice;
 mod current_loop;
 mod delay;
 mod encoder;
 mod feedforward;
+mod filter;
 mod ideal;
+mod jerk_filter;
 mod limit;
 mod plant;
 mod position_loop;
+mod reversal;
 mod speed_loop;
 mod transition;
 mod wire;

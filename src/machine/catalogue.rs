@@ -3,12 +3,13 @@
 //! In: nothing. Out: [`tables`]. One row a key, for the control here and for the axes in `axis_catalogue`.
 //! The checks that need more than one key (lower < upper, whole ratios of cycles) are not here but in `control`, `axis`, `drive`.
 
-use super::axis_catalogue::{AXIS, DRIVE, DYNAMICS, ENCODER, MECHANICS, MOTOR};
+use super::axis_catalogue::{AXIS, DYNAMICS};
 use super::checked::{
     AccelerationMode, ArcLimits, BlendLaw, BlendLimits, BlendShape, CompressorBlocks, CornerRule, CurvatureJump,
     FineInterpolation, PathMode, TimeLawKind,
 };
 use super::choices::{Carries, KinematicsType, words};
+use super::drive_catalogue::{DRIVE, ENCODER, MECHANICS, MOTOR};
 use super::keys::{Absent, Accepts, Key, Range, TableKeys};
 use Absent::{Means, Number as Value, Required, Word};
 use Accepts::{Choice, Joints, Number, Text, Vector, Whole};

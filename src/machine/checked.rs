@@ -3,6 +3,7 @@
 //! In: nothing (plain data). Out: [`Machine`] and its parts. Invariants, guaranteed by `machine::load`: at least one axis, names
 //! unique, every limit finite and positive, every period a whole number of ticks.
 
+use super::drive_options::{DriveOptions, PositionSource};
 use crate::base::{AxisId, AxisKind, PerAxis, TimeBase};
 
 /// A machine whose every value has been checked.
@@ -447,6 +448,8 @@ pub struct DriveData {
     pub mechanics: MechanicsData,
     /// Encoders.
     pub encoder: EncoderData,
+    /// Filters, compensations and limits besides the cascade.
+    pub options: DriveOptions,
 }
 
 /// `[axes.*.motor]`.
@@ -481,6 +484,8 @@ pub struct MechanicsData {
     pub gravity_sin_n_m: f64,
     /// `gc`.
     pub gravity_cos_n_m: f64,
+    /// Play between motor and load; 0 = none.
+    pub backlash_lu: f64,
 }
 
 /// `[axes.*.encoder]`.
@@ -490,4 +495,6 @@ pub struct EncoderData {
     pub position_resolution_lu: f64,
     /// `q_mot`; 0 = ideal.
     pub motor_resolution_rad: f64,
+    /// MD31040.
+    pub position_source: PositionSource,
 }

@@ -6,6 +6,7 @@
 use super::axis::{by_kind, lu};
 use super::checked::{AxisLimits, DriveData, EncoderData, MechanicsData, MotorData};
 use super::clock::LoopCycles;
+use super::drive_options::{options, small_lu};
 use super::section::Section;
 use crate::base::AxisKind;
 use crate::base::diagnostics::Diagnostic;
@@ -52,6 +53,8 @@ fn controllers<'f>(
     };
     let in_position_coarse_lu = window("in_position_coarse_um", "in_position_coarse_deg");
     let in_position_fine_lu = window("in_position_fine_um", "in_position_fine_deg");
+    let position_cycle_s = s_from_ms(drive.number("position_cycle_ms"));
+    let speed_cycle_s = s_from_us(drive.number("speed_cycle_us"));
     let speed_key = by_kind(kind, "speed_setpoint_max_mm_s", "speed_setpoint_max_deg_s");
     let data = DriveData {
         identified: drive.flag("identified"),
@@ -79,6 +82,7 @@ fn controllers<'f>(
         motor,
         mechanics,
         encoder,
+        options: options(&drive, position_cycle_s, speed_cycle_s),
     };
     if in_position_fine_lu > in_position_coarse_lu {
         let key = by_kind(kind, "in_position_fine_um", "in_position_fine_deg");
@@ -86,8 +90,8 @@ fn controllers<'f>(
         drive.report_at(key, "", Diagnostic::warning("M0104", message).help("the fine window is the smaller one"));
     }
     let cycles = LoopCycles {
-        position_cycle_s: s_from_ms(drive.number("position_cycle_ms")),
-        speed_cycle_s: s_from_us(drive.number("speed_cycle_us")),
+        position_cycle_s,
+        speed_cycle_s,
         current_cycle_s: s_from_us(drive.number("current_cycle_us")),
         drive,
     };
@@ -132,6 +136,7 @@ fn mechanics(axis: &Section<'_>) -> MechanicsData {
         gravity_n_m: mechanics.number("gravity_n_m"),
         gravity_sin_n_m: mechanics.number("gravity_sin_n_m"),
         gravity_cos_n_m: mechanics.number("gravity_cos_n_m"),
+        backlash_lu: small_lu(&mechanics, "backlash_um", "backlash_deg"),
     }
 }
 
@@ -157,7 +162,11 @@ fn encoder(axis: &Section<'_>) -> EncoderData {
         AxisKind::Linear => mm_from_um(encoder.number("position_resolution_um")),
         AxisKind::Rotary => lu(kind, encoder.number("position_resolution_deg")),
     };
-    EncoderData { position_resolution_lu, motor_resolution_rad: encoder.number("motor_resolution_rad") }
+    EncoderData {
+        position_resolution_lu,
+        motor_resolution_rad: encoder.number("motor_resolution_rad"),
+        position_source: encoder.choice("position_source"),
+    }
 }
 
 /// A drive that cannot reach the velocity of its axis never follows a rapid: worth a word.

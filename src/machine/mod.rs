@@ -13,6 +13,8 @@ mod clock;
 mod control;
 mod document;
 mod drive;
+mod drive_catalogue;
+mod drive_options;
 mod keys;
 mod later;
 mod load;
@@ -27,6 +29,9 @@ mod workshop;
 pub use catalogue::tables;
 pub use checked::*;
 pub use choices::Choice;
+pub use drive_options::{
+    Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, JerkFilter, JerkFilterKind, PositionSource,
+};
 pub use keys::{Absent, Accepts, Key, Range, TableKeys};
 pub use later::unsupported;
 pub use load::{LoadError, Loaded, load, parse};

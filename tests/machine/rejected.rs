@@ -99,6 +99,24 @@ fn every_value_outside_its_range() {
     }
 }
 
+/// The loops of the example run at 1 ms and 125 µs: 500 Hz and 4000 Hz are half their rates.
+#[test]
+fn a_filter_above_half_the_rate_of_its_loop() {
+    let add = |lines: &str| with(EXAMPLE, "current_max_a = 28.0", &format!("current_max_a = 28.0\n{lines}"));
+    for (lines, key) in [
+        ("speed_filter = \"pt1\"\nspeed_filter_frequency_hz = 4000.0", "speed_filter_frequency_hz"),
+        ("current_filter_3 = \"pt2\"\ncurrent_filter_3_frequency_hz = 4100.0", "current_filter_3_frequency_hz"),
+        ("reference_model_frequency_hz = 5e3", "reference_model_frequency_hz"),
+        ("jerk_filter = \"band_stop\"\njerk_filter_frequency_hz = 500.0", "jerk_filter_frequency_hz"),
+        ("jerk_filter = \"second_order\"\njerk_filter_time_ms = 0.6", "jerk_filter_time_ms"),
+    ] {
+        let message = only_error(&add(lines));
+        assert_says(&message, &[key, "not below half the sampling frequency"]);
+    }
+    let off = add("speed_filter_frequency_hz = 4000.0\njerk_filter_frequency_hz = 900.0");
+    assert!(parse(&off).is_ok(), "a filter that is off has no frequency");
+}
+
 #[test]
 fn infinity_is_allowed_where_it_means_no_limit() {
     let keys = [

@@ -1,0 +1,453 @@
+//! Every key of `[axes.*.drive]`, `motor`, `mechanics` and `encoder`: name, unit, range, default, machine data, meaning.
+//!
+//! In: nothing. Out: the rows that `catalogue` lists. Symbols in brackets are those of models/drive.md section 2.
+
+use super::choices::words;
+use super::drive_options::{Balancing, FilterShape, JerkFilterKind, PositionSource};
+use super::keys::{Absent, Accepts, Key, Range};
+use Absent::{Means, No, Number as Value, Required, Word};
+use Accepts::{Choice, Flag, Number};
+
+const POSITIVE: Accepts = Number(Range::Positive);
+/// Delays in ms: a second is far beyond any control, and a delay line takes memory for every cycle of it.
+const DELAY: Accepts = Number(Range::Within(0.0, 1000.0));
+/// Times of filters in ms.
+const FILTER_TIME: Accepts = Number(Range::UpTo(0.0, 1000.0));
+/// Cycles of the inner loops in µs: below one no drive works, and a run would take for ever.
+const LOOP_CYCLE: Accepts = Number(Range::Within(1.0, 1e6));
+const NOT_NEGATIVE: Accepts = Number(Range::NotNegative);
+const OR_INFINITE: Accepts = Number(Range::PositiveOrInfinite);
+const ANY: Accepts = Number(Range::Any);
+const DAMPING: Accepts = Number(Range::UpTo(0.0, 10.0));
+const NUMERATOR_DAMPING: Accepts = Number(Range::Within(0.0, 10.0));
+/// As p1520 allows it to be 0: no torque in that direction.
+const UPPER: Accepts = Number(Range::Within(0.0, 1e12));
+const LOWER: Accepts = Number(Range::Within(-1e12, 0.0));
+
+pub(super) const DRIVE: &[Key] = &[
+    Key::new("identified", "", Flag, No, "false: representative values, and every figure that depends on them says so"),
+    Key::new("in_position_coarse_um", "µm", POSITIVE, Value(40.0), "exact-stop window, coarse")
+        .linear("in_position_coarse_deg")
+        .md("MD36000"),
+    Key::new("in_position_fine_um", "µm", POSITIVE, Value(10.0), "exact-stop window, fine")
+        .linear("in_position_fine_deg")
+        .md("MD36010"),
+    Key::new("in_position_coarse_deg", "deg", POSITIVE, Value(0.04), "exact-stop window, coarse")
+        .rotary("in_position_coarse_um")
+        .md("MD36000"),
+    Key::new("in_position_fine_deg", "deg", POSITIVE, Value(0.01), "exact-stop window, fine")
+        .rotary("in_position_fine_um")
+        .md("MD36010"),
+    Key::new("position_cycle_ms", "ms", POSITIVE, Required, "[T_p] t_s is a whole multiple of it").md("MD10061"),
+    Key::new("speed_cycle_us", "µs", LOOP_CYCLE, Required, "[T_v] the position cycle is a whole multiple of it")
+        .md("p0115[1], MD1001"),
+    Key::new("current_cycle_us", "µs", LOOP_CYCLE, Required, "[T_i] the speed cycle is a whole multiple of it")
+        .md("p0115[0], MD1000"),
+    Key::new("position_gain_per_s", "1/s", POSITIVE, Required, "[Kv] 1 (m/min)/mm = 16.667 1/s").md("MD32200"),
+    Key::new(
+        "velocity_feedforward",
+        "",
+        NOT_NEGATIVE,
+        Value(1.0),
+        "[kvff] weight of the velocity feed-forward, 0 = off",
+    )
+    .md("MD32610"),
+    Key::new("torque_feedforward", "", NOT_NEGATIVE, Value(0.0), "[ktff] weight of the torque feed-forward, 0 = off"),
+    Key::new(
+        "feedforward_inertia_kg_m2",
+        "kg·m²",
+        NOT_NEGATIVE,
+        Means("mechanics.inertia_kg_m2"),
+        "[J_ff] inertia that the torque feed-forward works with",
+    )
+    .md("MD32650"),
+    Key::new("setpoint_delay_ms", "ms", DELAY, Value(0.0), "[d_pos] balancing delay of the position set-point")
+        .md("MD32810, MD32800"),
+    Key::new("feedforward_delay_ms", "ms", DELAY, Value(0.0), "[d_ff] delay of both feed-forward signals"),
+    Key::new("speed_setpoint_max_mm_s", "mm/s", OR_INFINITE, Means("inf"), "[v_max] clamp of the speed set-point")
+        .linear("speed_setpoint_max_deg_s")
+        .md("MD36210, p1082"),
+    Key::new("speed_setpoint_max_deg_s", "deg/s", OR_INFINITE, Means("inf"), "[v_max] clamp of the speed set-point")
+        .rotary("speed_setpoint_max_mm_s")
+        .md("MD36210, p1082"),
+    Key::new("speed_gain_n_m_s_per_rad", "N·m·s/rad", POSITIVE, Required, "[Kp] gain of the speed controller")
+        .md("p1460, MD1407"),
+    Key::new(
+        "speed_reset_time_ms",
+        "ms",
+        OR_INFINITE,
+        Required,
+        "[Tn] reset time of the speed controller; inf = no integral part",
+    )
+    .md("p1462, MD1409"),
+    Key::new("current_gain_v_per_a", "V/A", POSITIVE, Required, "[Kpi] gain of the current controller")
+        .md("p1715, MD1120"),
+    Key::new(
+        "current_reset_time_ms",
+        "ms",
+        OR_INFINITE,
+        Required,
+        "[Tni] reset time of the current controller; inf = no integral part",
+    )
+    .md("p1717, MD1121"),
+    Key::new("current_max_a", "A", OR_INFINITE, Required, "[i_max] current limit; the torque limit is Kt times it")
+        .md("p0640"),
+    Key::new("voltage_max_v", "V", OR_INFINITE, Required, "[u_max] voltage limit, phase rms: about U_dc / sqrt 6"),
+    Key::new(
+        "feedforward_balancing",
+        "",
+        Choice(words::<Balancing>),
+        Word("dead_time"),
+        "how the set-point waits for setpoint_delay_ms: dead_time is FFW_MODE 3 and 4, pt1 is 1 and 2",
+    )
+    .md("MD32620"),
+    Key::new("stiffness_control", "", Flag, No, "DSC: the position controller works in the speed cycle").md("MD32640"),
+    Key::new("jerk_filter", "", Choice(words::<JerkFilterKind>), Word("off"), "filter of the position set-point")
+        .md("MD32400, MD32402"),
+    Key::new("jerk_filter_time_ms", "ms", FILTER_TIME, Value(1.0), "time of an average, delay of the second order")
+        .md("MD32410"),
+    Key::new("jerk_filter_time_add_ms", "ms", FILTER_TIME, Value(1.0), "time of the second average").md("MD32411"),
+    Key::new("jerk_filter_frequency_hz", "Hz", POSITIVE, Value(10.0), "frequency of the band-stop").md("MD32412"),
+    Key::new(
+        "jerk_filter_damping",
+        "",
+        NUMERATOR_DAMPING,
+        Value(0.0),
+        "numerator damping of the band-stop, 0 blocks completely",
+    )
+    .md("MD32414"),
+    Key::new(
+        "reference_model_frequency_hz",
+        "Hz",
+        NOT_NEGATIVE,
+        Value(0.0),
+        "reference model of the speed loop, seen by its integral part; 0 = off",
+    )
+    .md("p1433"),
+    Key::new("reference_model_damping", "", DAMPING, Value(1.0), "its damping").md("p1434"),
+    Key::new(
+        "torque_upper_n_m",
+        "N·m",
+        UPPER,
+        Means("Kt times current_max_a"),
+        "upper torque limit, at the motor shaft",
+    )
+    .md("p1520"),
+    Key::new(
+        "torque_lower_n_m",
+        "N·m",
+        LOWER,
+        Means("minus Kt times current_max_a"),
+        "lower torque limit, at the motor shaft",
+    )
+    .md("p1521"),
+    Key::new(
+        "friction_compensation_mm_s",
+        "mm/s",
+        ANY,
+        Value(0.0),
+        "pulse on the velocity command at a reversal; 0 = off",
+    )
+    .linear("friction_compensation_deg_s")
+    .md("MD32500, MD32520"),
+    Key::new(
+        "friction_compensation_deg_s",
+        "deg/s",
+        ANY,
+        Value(0.0),
+        "pulse on the velocity command at a reversal; 0 = off",
+    )
+    .rotary("friction_compensation_mm_s")
+    .md("MD32500, MD32520"),
+    Key::new(
+        "friction_compensation_time_ms",
+        "ms",
+        FILTER_TIME,
+        Value(10.0),
+        "time constant with which the pulse fades",
+    )
+    .md("MD32540"),
+    Key::new(
+        "backlash_compensation_um",
+        "µm",
+        ANY,
+        Value(0.0),
+        "correction of the measured position at a reversal; 0 = off",
+    )
+    .linear("backlash_compensation_deg")
+    .md("MD32450"),
+    Key::new(
+        "backlash_compensation_deg",
+        "deg",
+        ANY,
+        Value(0.0),
+        "correction of the measured position at a reversal; 0 = off",
+    )
+    .rotary("backlash_compensation_um")
+    .md("MD32450"),
+    Key::new("speed_filter", "", Choice(words::<FilterShape>), Word("off"), "filter of the speed set-point")
+        .md("p1414, p1415"),
+    Key::new(
+        "speed_filter_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter of the speed set-point: corner of a PT1, else frequency of the denominator",
+    )
+    .md("p1416, p1417"),
+    Key::new(
+        "speed_filter_damping",
+        "",
+        DAMPING,
+        Value(0.7),
+        "filter of the speed set-point: damping of the denominator",
+    )
+    .md("p1418"),
+    Key::new(
+        "speed_filter_numerator_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter of the speed set-point: frequency that the second order blocks",
+    )
+    .md("p1419"),
+    Key::new(
+        "speed_filter_numerator_damping",
+        "",
+        NUMERATOR_DAMPING,
+        Value(0.7),
+        "filter of the speed set-point: damping of the numerator, 0 blocks completely",
+    )
+    .md("p1420"),
+    Key::new("current_filter_1", "", Choice(words::<FilterShape>), Word("off"), "filter 1 of the current set-point")
+        .md("p1656.0, p1657"),
+    Key::new(
+        "current_filter_1_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 1 of the current set-point: corner of a PT1, else frequency of the denominator",
+    )
+    .md("p1658"),
+    Key::new(
+        "current_filter_1_damping",
+        "",
+        DAMPING,
+        Value(0.7),
+        "filter 1 of the current set-point: damping of the denominator",
+    )
+    .md("p1659"),
+    Key::new(
+        "current_filter_1_numerator_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 1 of the current set-point: frequency that the second order blocks",
+    )
+    .md("p1660"),
+    Key::new(
+        "current_filter_1_numerator_damping",
+        "",
+        NUMERATOR_DAMPING,
+        Value(0.7),
+        "filter 1 of the current set-point: damping of the numerator, 0 blocks completely",
+    )
+    .md("p1661"),
+    Key::new("current_filter_2", "", Choice(words::<FilterShape>), Word("off"), "filter 2 of the current set-point")
+        .md("p1656.1, p1662"),
+    Key::new(
+        "current_filter_2_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 2 of the current set-point: corner of a PT1, else frequency of the denominator",
+    )
+    .md("p1663"),
+    Key::new(
+        "current_filter_2_damping",
+        "",
+        DAMPING,
+        Value(0.7),
+        "filter 2 of the current set-point: damping of the denominator",
+    )
+    .md("p1664"),
+    Key::new(
+        "current_filter_2_numerator_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 2 of the current set-point: frequency that the second order blocks",
+    )
+    .md("p1665"),
+    Key::new(
+        "current_filter_2_numerator_damping",
+        "",
+        NUMERATOR_DAMPING,
+        Value(0.7),
+        "filter 2 of the current set-point: damping of the numerator, 0 blocks completely",
+    )
+    .md("p1666"),
+    Key::new("current_filter_3", "", Choice(words::<FilterShape>), Word("off"), "filter 3 of the current set-point")
+        .md("p1656.2, p1667"),
+    Key::new(
+        "current_filter_3_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 3 of the current set-point: corner of a PT1, else frequency of the denominator",
+    )
+    .md("p1668"),
+    Key::new(
+        "current_filter_3_damping",
+        "",
+        DAMPING,
+        Value(0.7),
+        "filter 3 of the current set-point: damping of the denominator",
+    )
+    .md("p1669"),
+    Key::new(
+        "current_filter_3_numerator_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 3 of the current set-point: frequency that the second order blocks",
+    )
+    .md("p1670"),
+    Key::new(
+        "current_filter_3_numerator_damping",
+        "",
+        NUMERATOR_DAMPING,
+        Value(0.7),
+        "filter 3 of the current set-point: damping of the numerator, 0 blocks completely",
+    )
+    .md("p1671"),
+    Key::new("current_filter_4", "", Choice(words::<FilterShape>), Word("off"), "filter 4 of the current set-point")
+        .md("p1656.3, p1672"),
+    Key::new(
+        "current_filter_4_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 4 of the current set-point: corner of a PT1, else frequency of the denominator",
+    )
+    .md("p1673"),
+    Key::new(
+        "current_filter_4_damping",
+        "",
+        DAMPING,
+        Value(0.7),
+        "filter 4 of the current set-point: damping of the denominator",
+    )
+    .md("p1674"),
+    Key::new(
+        "current_filter_4_numerator_frequency_hz",
+        "Hz",
+        POSITIVE,
+        Value(1999.0),
+        "filter 4 of the current set-point: frequency that the second order blocks",
+    )
+    .md("p1675"),
+    Key::new(
+        "current_filter_4_numerator_damping",
+        "",
+        NUMERATOR_DAMPING,
+        Value(0.7),
+        "filter 4 of the current set-point: damping of the numerator, 0 blocks completely",
+    )
+    .md("p1676"),
+];
+
+pub(super) const MOTOR: &[Key] = &[
+    Key::new("resistance_ohm", "ohm", POSITIVE, Required, "[R] phase resistance").md("p0350"),
+    Key::new("inductance_mh", "mH", POSITIVE, Required, "[L] rotating-field inductance").md("p0356"),
+    Key::new("back_emf_v_s_per_rad", "V·s/rad", NOT_NEGATIVE, Required, "[Ke] back-EMF per phase rms, about Kt / 3")
+        .md("p0317"),
+    Key::new("torque_constant_n_m_per_a", "N·m/A", POSITIVE, Required, "[Kt] torque per A rms").md("p0316"),
+];
+
+pub(super) const MECHANICS: &[Key] = &[
+    Key::new("pitch_mm", "mm", Number(Range::NotZero), Required, "load motion per turn of the screw; may be negative")
+        .linear("gear_ratio")
+        .md("MD31030"),
+    Key::new(
+        "gear_ratio",
+        "",
+        Number(Range::NotZero),
+        Means("1; required on a rotary axis"),
+        "motor turns per turn of the screw or of the rotary axis; may be negative",
+    )
+    .md("MD31060 / MD31050"),
+    Key::new("inertia_kg_m2", "kg·m²", POSITIVE, Required, "[J] everything, at the motor shaft")
+        .md("p0341 * p0342 + p1498"),
+    Key::new(
+        "viscous_friction_n_m_s_per_rad",
+        "N·m·s/rad",
+        NOT_NEGATIVE,
+        Required,
+        "[B] viscous friction, at the motor shaft",
+    ),
+    Key::new("coulomb_friction_n_m", "N·m", NOT_NEGATIVE, Required, "[Tc] dry friction in motion, at the motor shaft"),
+    Key::new(
+        "breakaway_friction_n_m",
+        "N·m",
+        NOT_NEGATIVE,
+        Means("coulomb_friction_n_m"),
+        "[Ts] dry friction at rest, at least coulomb_friction_n_m",
+    ),
+    Key::new("gravity_n_m", "N·m", ANY, Value(0.0), "[g0] constant load torque at the motor: a vertical axis"),
+    Key::new(
+        "gravity_sin_n_m",
+        "N·m",
+        ANY,
+        Value(0.0),
+        "[gs] load torque with the sine of the axis angle: a tilting table",
+    ),
+    Key::new(
+        "gravity_cos_n_m",
+        "N·m",
+        ANY,
+        Value(0.0),
+        "[gc] load torque with the cosine of the axis angle: a tilting table",
+    ),
+    Key::new("backlash_um", "µm", NOT_NEGATIVE, Value(0.0), "play between motor and load, 0 = none")
+        .linear("backlash_deg"),
+    Key::new("backlash_deg", "deg", NOT_NEGATIVE, Value(0.0), "play between motor and load, 0 = none")
+        .rotary("backlash_um"),
+];
+
+pub(super) const ENCODER: &[Key] = &[
+    Key::new(
+        "position_resolution_um",
+        "µm",
+        NOT_NEGATIVE,
+        Value(0.0),
+        "[q_pos] quantum of the position scale, 0 = ideal",
+    )
+    .linear("position_resolution_deg")
+    .md("MD31010"),
+    Key::new(
+        "position_resolution_deg",
+        "deg",
+        NOT_NEGATIVE,
+        Value(0.0),
+        "[q_pos] quantum of the position scale, 0 = ideal",
+    )
+    .rotary("position_resolution_um")
+    .md("MD31010"),
+    Key::new(
+        "motor_resolution_rad",
+        "rad",
+        NOT_NEGATIVE,
+        Value(0.0),
+        "[q_mot] quantum of the motor encoder, 0 = ideal",
+    )
+    .md("p0408"),
+    Key::new(
+        "position_source",
+        "",
+        Choice(words::<PositionSource>),
+        Word("load"),
+        "where the position is measured: load = scale, motor = motor encoder",
+    )
+    .md("MD31040"),
+];
