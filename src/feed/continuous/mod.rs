@@ -319,9 +319,9 @@ impl Continuous {
         self.kept = ways.partition_point(|way_lu| *way_lu <= kept_lu).saturating_sub(1);
         self.disturbed = self.kept;
         // Where all of a plan brakes, planning again for each piece would cost more than a window that is a little shorter.
-        let stale = self.places.len() / STALE_PIECES;
-        let stale = stale.checked_sub(1).and_then(|last| self.places.get(last));
-        self.kept = stale.map_or(self.kept, |place| self.kept.max(place.intervals.end));
+        // The front is handed out in any case, and with it all that share its interval: a plan begins where an interval does.
+        let stale = (self.places.len() / STALE_PIECES).saturating_sub(1);
+        self.kept = self.places.get(stale).map_or(self.kept, |place| self.kept.max(place.intervals.end));
     }
 }
 
