@@ -216,6 +216,23 @@ fn continuous() {
     prove(Law::Continuous, known);
 }
 
+/// Seeds whose set-points broke a limit once: BRISK with a curve that bends within micrometres, a feed at the start of a plan, a plan that began
+/// in the middle of an interval.
+const BROKE_ONCE: [u64; 8] = [3632, 6477, 5355, 6252, 10823, 11939, 12164, 15105];
+
+#[test]
+fn programs_that_broke_a_limit_once() {
+    for seed in BROKE_ONCE {
+        let (settings, program, random) = case(seed, Law::Continuous);
+        let left = unknown(judged(&settings, &program, Some(random)), known);
+        assert!(
+            left.is_empty(),
+            "seed {seed}: {} findings, such as PROOF_FIRST={seed} PROOF_PROGRAMS=1 shows",
+            left.len()
+        );
+    }
+}
+
 #[test]
 fn continuous_transformed() {
     prove_transformed(Law::Continuous, |_| false);
