@@ -323,18 +323,7 @@ impl Continuous {
         let stale = (self.places.len() / STALE_PIECES).saturating_sub(1);
         self.kept = self.places.get(stale).map_or(self.kept, |place| self.kept.max(place.intervals.end));
     }
-}
 
-/// Derivatives on the curve of an interval; `owners`: the piece with which each begins.
-fn look<'a>(pieces: &'a [Piece<'_>], owners: &'a [usize]) -> impl Fn(usize, f64) -> Derivatives + use<'a> {
-    move |index, s_lu| {
-        let paths = pieces[owners[index]..].iter().map(|piece| piece.path);
-        let place = group::place(paths, s_lu).unwrap_or((pieces[owners[index]].path, s_lu));
-        Derivatives::from(place.0.at(place.1))
-    }
-}
-
-impl Continuous {
     /// How many pieces a plan reaches; those that are no intervals by themselves get their grids. The first `known` ones have places already.
     fn reach(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> usize {
         let (mut beyond_ratio, mut intervals, mut beyond_lu) = (0.0, 0.0, 0.0);
@@ -393,5 +382,14 @@ impl Continuous {
         };
         let last = if piece.rests_after { End::Rest } else { End::Speed(group::speed_after_lu_s(pieces, index)) };
         [first, last]
+    }
+}
+
+/// Derivatives on the curve of an interval; `owners`: the piece with which each begins.
+fn look<'a>(pieces: &'a [Piece<'_>], owners: &'a [usize]) -> impl Fn(usize, f64) -> Derivatives + use<'a> {
+    move |index, s_lu| {
+        let paths = pieces[owners[index]..].iter().map(|piece| piece.path);
+        let place = group::place(paths, s_lu).unwrap_or((pieces[owners[index]].path, s_lu));
+        Derivatives::from(place.0.at(place.1))
     }
 }
