@@ -27,7 +27,7 @@
 //! The rules that bound h: at a corner that is left (G64) the axis velocity steps by at most `corner_rule` allows; where only the
 //! curvature steps the axis acceleration steps by at most J t_s, J the jerk of transitions where it is given.
 
-use crate::run::{BORDER_LU, Posture, Run, Target};
+use crate::run::{BORDER_LU, Posture, Run, TANGENT_RAD, Target};
 use crate::settings::Law;
 use crate::verdict::{Finding, Kind};
 use sollwert::machine::{AccelerationMode, Machine};
@@ -37,9 +37,6 @@ const RATIO: f64 = 1e-6;
 
 /// Rounding of the place on the path: of a time of some 100 s times a speed of some 100 mm/s, and of the arc length of a spline.
 const PLACE_LU: f64 = 2e-11;
-
-/// Directions that differ by less are one direction [Gassara 2013]: rounding of the points of arcs.
-const TANGENT_RAD: f64 = 1e-3;
 
 /// Most steps of the path between one set-point and the next.
 #[derive(Clone, Copy, Default)]

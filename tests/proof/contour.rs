@@ -36,7 +36,7 @@ pub fn check(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Vec<Findi
     let mut findings: Vec<Finding> = points(machine, run).into_iter().collect();
     findings.extend(feeds(run));
     findings.extend(rests(machine, run, places));
-    findings.extend(ends(machine, run));
+    findings.extend(ends(machine, run, places));
     findings
 }
 
@@ -175,7 +175,7 @@ pub fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Fi
         }
         for row in [&run.rows[k - 1], &run.rows[k]] {
             let text = format!("exact stop before line {}, distance of a set-point", run.rows[k].line);
-            let found = far(machine, run, &row.q, &point, &text);
+            let found = far(machine, run, &row.q, &point, false, &text);
             // Two rests in one cycle: only the way between them is short.
             if found.is_some() && (from..to).filter(|n| run.joints[*n].rests).count() == 1 {
                 return found;
@@ -185,19 +185,21 @@ pub fn rests(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Option<Fi
     None
 }
 
-/// An axis that is further from `point` than jerk makes of rest in one cycle.
-fn far(machine: &Machine, run: &Run, q: &Posture, point: &Posture, text: &str) -> Option<Finding> {
+/// An axis that is further from `point` than jerk makes of rest in one cycle; `corner`: and the step of its velocity at a corner.
+fn far(machine: &Machine, run: &Run, q: &Posture, point: &Posture, corner: bool, text: &str) -> Option<Finding> {
     machine.axes.iter().enumerate().find_map(|(i, axis)| {
         let jerk = axis.limits.jerk_max_lu_s3.max(axis.limits.transition_jerk_max_lu_s3);
         let soft = jerk * run.t_s.powi(3) / 6.0;
         let moved = if run.brisk() { axis.limits.acceleration_max_lu_s2 * run.t_s.powi(2) / 2.0 } else { soft };
-        let allowed = moved * (1.0 + 1e-6) + 1e-9;
+        let step = (8.0 * axis.limits.acceleration_max_lu_s2 * axis.follow_up_tolerance_lu).sqrt();
+        let left = if corner { step * run.t_s } else { 0.0 };
+        let allowed = (moved + left) * (1.0 + 1e-6) + 1e-9;
         finding(Kind::Rest, (q[i] - point[i]).abs(), allowed, format!("{text}, axis {}", axis.name))
     })
 }
 
 /// Start, end, cycle time.
-fn ends(machine: &Machine, run: &Run) -> Vec<Finding> {
+fn ends(machine: &Machine, run: &Run, places: &[(usize, f64)]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let (rows, home): (_, Posture) = (&run.rows, [0.0; 5]);
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
@@ -212,14 +214,12 @@ fn ends(machine: &Machine, run: &Run) -> Vec<Finding> {
         "the last set-point is off the last point".into(),
     ));
     if rows.len() > 1 {
-        findings.extend(far(machine, run, &rows[1].q, &home, "start, distance of set-point 1"));
-        findings.extend(far(
-            machine,
-            run,
-            &rows[rows.len() - 2].q,
-            &end,
-            "end, distance of the last set-point but one",
-        ));
+        let before = rows.len() - 2;
+        let corners =
+            [0..places[1].0, places[before].0..places[before + 1].0].map(|joints| run.turns(joints).count() > 0);
+        findings.extend(far(machine, run, &rows[1].q, &home, corners[0], "start, distance of set-point 1"));
+        let text = "end, distance of the last set-point but one";
+        findings.extend(far(machine, run, &rows[before].q, &end, corners[1], text));
     }
     let cycles = (rows.len() - 1) as f64;
     if let Some(summary) = &run.summary {

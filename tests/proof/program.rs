@@ -139,7 +139,7 @@ impl Program {
     /// The same path the other way; `None` where modes change on the way.
     pub fn reversed(&self) -> Option<Self> {
         // What a compressor makes of the points depends on where it begins.
-        if self.blocks.iter().any(|block| matches!(block, Block::Word(word) if word.starts_with("COMP"))) {
+        if self.compresses() {
             return None;
         }
         let modes = self.blocks.iter().take_while(|block| matches!(block, Block::Word(_))).count();
@@ -148,6 +148,11 @@ impl Program {
         let reversed: Option<Vec<Block>> = motions.iter().rev().map(Block::reversed).collect();
         blocks.extend(reversed?);
         Some(Self { blocks })
+    }
+
+    /// A compressor is on somewhere.
+    pub fn compresses(&self) -> bool {
+        self.blocks.iter().any(|block| matches!(block, Block::Word(word) if word.starts_with("COMP")))
     }
 
     /// With block `index`, a line, in two; `None` if it is none, or short.

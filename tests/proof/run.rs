@@ -72,6 +72,9 @@ pub struct Joint {
     pub rests: bool,
 }
 
+/// Directions that differ by less are one direction [Gassara 2013]: rounding of the points of arcs.
+pub const TANGENT_RAD: f64 = 1e-3;
+
 /// Everything that is judged.
 #[derive(Clone)]
 pub struct Run {
@@ -157,6 +160,25 @@ impl Run {
     /// Places where the path rests.
     pub fn rests(&self) -> usize {
         self.joints.iter().filter(|joint| joint.rests).count()
+    }
+
+    /// Steps of direction at corners that are left by a step of the velocity, together.
+    pub fn turning(&self) -> f64 {
+        self.turns(0..self.joints.len()).sum()
+    }
+
+    /// Steps of the curvature where the path goes on, together.
+    pub fn bending(&self) -> f64 {
+        let moving = self.joints.iter().filter(|joint| !joint.rests);
+        moving.map(|joint| joint.bend.iter().map(|x| x * x).sum::<f64>().sqrt()).sum()
+    }
+
+    /// Steps of direction among some joints.
+    pub fn turns(&self, joints: std::ops::Range<usize>) -> impl Iterator<Item = f64> {
+        let joints = self.joints.get(joints.start..joints.end.min(self.joints.len())).unwrap_or(&[]);
+        let moving = joints.iter().filter(|joint| !joint.rests);
+        let turns = moving.map(|joint| joint.turn.iter().map(|x| x * x).sum::<f64>().sqrt());
+        turns.filter(|turn| *turn > TANGENT_RAD)
     }
 
     /// The same stops and the same blends, in the same order.

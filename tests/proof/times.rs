@@ -14,6 +14,13 @@ const WINDOW_BLOCKS: u32 = 2000;
 const REVERSED_RATIO: f64 = 0.005;
 const REVERSED_CYCLES: f64 = 3.0;
 
+/// What the corners of one path may differ by, and its steps of curvature; less than this sum of those is rounding.
+const STEPS_RATIO: f64 = 0.01;
+const BENDING_MIN: f64 = 1e-6;
+
+/// And each of its blends.
+const BLEND_RATIO: f64 = 1e-3;
+
 /// The reversed path takes as long. `None`: it does, or there is no such path. Under `seven-phase` a ramp ends where a block ends, and a
 /// backward pass is not the mirror of a forward one: nothing is promised.
 pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
@@ -31,8 +38,13 @@ pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
     let (back, _) = back.text_from(&settings, end, &opening);
     let time = |text: &str| Run::new(&machine, text).ok().map(|run| (run.cycle_time_s(), run));
     let ((there_s, first), (back_s, second), (approach_s, third)) = (time(&there)?, time(&back)?, time(&approach)?);
-    // Rounding of points may make a corner, or take one away.
-    let same_path = first.blends_lu().len() == second.blends_lu().len()
+    // Rounding of points may make a corner, or take one away: at a hair of a line between an arc and its tangent, for one.
+    let (blends, mirrored) = (first.blends_lu(), second.blends_lu());
+    let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= BLEND_RATIO * a.max(*b);
+    let same_path = blends.len() == mirrored.len()
+        && blends.iter().zip(mirrored.iter().rev()).all(alike)
+        && (first.turning() - second.turning()).abs() <= STEPS_RATIO * first.turning()
+        && (first.bending() - second.bending()).abs() <= STEPS_RATIO * first.bending() + BENDING_MIN
         && (first.path_length_lu() + third.path_length_lu() - second.path_length_lu()).abs() < 1e-4;
     if !same_path {
         return None;
@@ -46,7 +58,8 @@ pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
 
 /// A line in two is the same motion. `None`: it is, or there is no line to split, or the split changes the path.
 pub fn split(settings: &Settings, program: &Program, random: &mut Random) -> Option<Finding> {
-    if settings.law != Law::Continuous {
+    // A compressor makes another curve of another point.
+    if settings.law != Law::Continuous || program.compresses() {
         return None;
     }
     let lines: Vec<usize> =

@@ -67,12 +67,12 @@ pub(super) struct Profile {
 const GAP_MAX_RATIO: f64 = 2e-4;
 
 /// Rounds of tangents.
-const ROUNDS_MAX: u32 = 3;
+const ROUNDS_MAX: u32 = 8;
 
 /// Where b is by no more than this away from its estimate the tangent is good enough: it misses 3/8 of the square of it.
 const STRAY_MAX_SHARE: f64 = 0.12;
 
-/// Share of a chain, from its start, in which tangents must fit.
+/// Share of a chain, from its start, in which tangents must fit, if the chain does not end where the path rests.
 const NEAR_SHARE: f64 = 0.6;
 
 /// Attempts with tighter limits where those between the places do not hold.
@@ -98,6 +98,8 @@ pub(super) struct Planning {
     solver: Solver,
     /// Whether there is a profile is to be found out quickly: what is found only with effort counts as none.
     pub hurries: bool,
+    /// The path rests at the end of the chain: no later plan will do it better.
+    pub is_last: bool,
     /// b̂ at the borders.
     estimate: Vec<f64>,
     caps: Vec<f64>,
@@ -119,13 +121,16 @@ impl Planning {
             return None;
         }
         let mut attempts = 0;
+        let mut before = None;
         for round in 0.. {
             if !self.solve(chain, start, &range) {
-                return None;
+                // A profile of earlier tangents obeys the true limits too: it is only slower.
+                return before.filter(|profile| tighten(chain, profile, &range, look));
             }
             let profile = self.profile(chain, start);
             if round + 1 < ROUNDS_MAX && self.strays(&profile, &range) {
                 self.take_estimate(&profile, &range);
+                before = Some(profile);
                 continue;
             }
             if tighten(chain, &profile, &range, look) {
@@ -136,6 +141,7 @@ impl Planning {
                 return if start == Start::Rest { slowed(chain, profile, &range, look) } else { None };
             }
             self.take_estimate(&profile, &range);
+            before = None;
         }
         None
     }
@@ -199,7 +205,8 @@ impl Planning {
             (point.speed_squared_lu2_s2 / estimate - 1.0).abs() > STRAY_MAX_SHARE
         };
         // What lies far ahead is planned again, with this solution for an estimate.
-        let near = (NEAR_SHARE * points.len() as f64).ceil() as usize;
+        let share = if self.is_last { 1.0 } else { NEAR_SHARE };
+        let near = (share * points.len() as f64).ceil() as usize;
         self.estimate.iter().zip(points).take(near).any(far)
     }
 

@@ -178,7 +178,8 @@ impl<'a> Cutter<'a> {
         let length_lu = stretch.length_lu();
         let start = Derivatives::from(path.at(stretch.from_lu));
         let straight = path.is_straight().then_some(start);
-        let tangent = Tangent::new(rules, blend, &start.first);
+        let end = straight.unwrap_or_else(|| Derivatives::from(path.at(stretch.to_lu)));
+        let tangent = Tangent::between(rules, blend, [&start.first, &end.first]);
         // From rest to rest in four phases of constant jerk, or in two of constant acceleration: the least that the piece can take.
         let alone_s = if tangent.jerk_limited {
             (32.0 * length_lu / tangent.jerk_lu_s3).cbrt()

@@ -20,8 +20,12 @@ const JUNCTION_SHARE: f64 = 0.999;
 /// A profile that uses a limit this many times is not slowed down but given up.
 const SLOWED_MAX_RATIO: f64 = 4.0;
 
-/// Above this use of a limit the curve itself is looked at.
+/// Above this use of a limit the curve itself is looked at, at its quarters.
 const NEAR_RATIO: f64 = 0.7;
+
+/// Where demands there are further than this from what the ends and the middle make one expect, of the limit, at its eighths: by cubics between the
+/// quarters an eighth of it would be missed.
+const MISSED_MAX_RATIO: f64 = 0.004;
 
 impl Profile {
     /// State inside an interval, `share` of its length from its start.
@@ -101,12 +105,35 @@ fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) 
     if interval.is_straight() {
         return used_straight(interval, profile, chain, index);
     }
-    let rough = most_used(interval, profile, chain, index, &interval.eighths(None));
+    let expected = interval.eighths(None);
+    let rough = most_used(interval, profile, chain, index, &expected);
     if rough < NEAR_RATIO || rough.is_nan() {
         return rough;
     }
-    let places = [0.25, 0.75].map(|share| interval.start_lu + share * interval.length_lu());
-    most_used(interval, profile, chain, index, &interval.eighths(Some(places.map(|s_lu| look(index, s_lu)))))
+    let at = |eighth: usize| look(index, interval.start_lu + 0.125 * eighth as f64 * interval.length_lu());
+    let mut states = interval.eighths(Some([at(2), at(6)]));
+    let misses = |place: &usize| missed(chain, profile, index, *place, [&states[*place], &expected[*place]]);
+    if [2, 6].iter().map(misses).any(|ratio| ratio > MISSED_MAX_RATIO || ratio.is_nan()) {
+        for eighth in [1, 3, 5, 7] {
+            states[eighth] = at(eighth);
+        }
+    }
+    most_used(interval, profile, chain, index, &states)
+}
+
+/// How far the demands of an eighth of an interval are apart for two opinions on its derivatives, of what is allowed.
+fn missed(chain: &Chain, profile: &Profile, index: usize, place: usize, states: [&Derivatives; 2]) -> f64 {
+    let interval = &chain.intervals[index];
+    let (point, bend) = profile.inside(chain, index, 0.125 * place as f64);
+    let v = point.speed_squared_lu2_s2.max(0.0).sqrt();
+    let mut most = 0.0_f64;
+    for bound in &interval.bounds.axes {
+        let [one, other] = states.map(|state| demands(bound, state, &point, bend));
+        let jerk = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
+        most = most.max((one[0] - other[0]).abs() / bound.acceleration_lu_s2);
+        most = most.max((one[1] - other[1]).abs() * v / jerk);
+    }
+    most
 }
 
 /// The same on a straight stretch: the acceleration is greatest at an end, the jerk where b is.

@@ -183,6 +183,17 @@ impl Tangent {
         Self { acceleration_lu_s2, jerk_lu_s3, step_s, jerk_limited }
     }
 
+    /// Of a piece with these directions at its ends: what both of them allow, so that it is cut the same in either direction.
+    pub fn between(rules: &AxisRules, blend: bool, ends: [&AxisVector; 2]) -> Self {
+        let [from, to] = ends.map(|first| Self::new(rules, blend, first));
+        Self {
+            acceleration_lu_s2: from.acceleration_lu_s2.min(to.acceleration_lu_s2),
+            jerk_lu_s3: from.jerk_lu_s3.min(to.jerk_lu_s3),
+            step_s: from.step_s.min(to.step_s),
+            jerk_limited: from.jerk_limited,
+        }
+    }
+
     /// The speed that is reached some way after `from_lu_s`.
     pub fn reached_lu_s(&self, from_lu_s: f64, way_lu: f64) -> f64 {
         let by_acceleration = (from_lu_s * from_lu_s + 2.0 * self.acceleration_lu_s2 * way_lu).sqrt();

@@ -113,7 +113,7 @@ impl Flow {
     /// A piece that moves; its curve has no step of direction or curvature inside. `ends`: the states there.
     pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool, ends: [&JointState; 2]) -> Self {
         let ends = ends.map(|state| Derivatives::from(*state));
-        let tangent = Tangent::new(throughout(&rules, path), blend, &ends[0].first);
+        let tangent = Tangent::between(throughout(&rules, path), blend, [&ends[0].first, &ends[1].first]);
         let brief = if blend { None } else { Brief::new(&rules, path, &tangent, ends).map(Box::new) };
         let ends_lu_s = match &brief {
             Some(brief) => [brief.speed_lu_s; 2],
@@ -162,9 +162,19 @@ impl Continuous {
 
     /// A new plan, if there is one.
     fn lay(&mut self, pieces: &mut [Piece<'_>]) -> bool {
-        let start = self.start();
         // From inside the front everything is cut again.
-        let known = if self.regime.point.is_some() { 0 } else { self.known() };
+        let (changes, all) = (self.regime.point.is_some(), self.places.len());
+        let known = if changes { 0 } else { self.known() };
+        if self.lay_after(pieces, known) {
+            return true;
+        }
+        // What is left of the plan before is a way that keeps every limit, but not on every other grid: so on its own.
+        !changes && known < all && all < pieces.len() && self.lay_after(pieces, all)
+    }
+
+    /// A new plan in which the first `known` pieces are cut as before.
+    fn lay_after(&mut self, pieces: &mut [Piece<'_>], known: usize) -> bool {
+        let start = self.start();
         let known = known.min(pieces.len().saturating_sub(1));
         let count = self.reach(pieces, known, start);
         let pieces = &mut pieces[..count];
@@ -234,6 +244,7 @@ impl Continuous {
         let Layout { chain, owners, .. } = layout;
         let (points, fast) = self.hints(chain);
         let look = look(pieces, owners);
+        self.planning.is_last = pieces.last().is_some_and(|last| last.rests_after);
         let planned = self.planning.plan(chain, start, &points[..fast], &look);
         if planned.is_some() || points.len() <= fast {
             return planned;
@@ -243,7 +254,8 @@ impl Continuous {
 
     /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
     fn hints(&self, chain: &Chain) -> (Vec<PathPoint>, usize) {
-        let end = self.uncut.max(self.first);
+        // The last interval is that of a stop: what it knows is its start.
+        let end = self.chain.intervals.len().saturating_sub(1).max(self.first);
         let (mut points, mut fast) = (Vec::with_capacity(chain.intervals.len()), 0);
         let (mut index, mut way_lu) = (self.first, self.offset_lu());
         for interval in &chain.intervals {
@@ -260,7 +272,7 @@ impl Continuous {
             } else {
                 self.profile.inside(&self.chain, index, share).0
             });
-            if index < self.braking {
+            if index < self.braking.min(self.uncut) {
                 fast = points.len();
             }
             way_lu += interval.length_lu();
