@@ -35,15 +35,22 @@ impl Interpreter {
 
     /// An expression that names an axis.
     pub(super) fn axis_of(&self, expression: &Expr) -> Outcome<AxisId> {
-        match evaluate(expression, self)? {
+        let no_axis = |text| {
+            Fault::new(codes::UNKNOWN_AXIS, expression.columns.clone(), text)
+                .label("expected the name of an axis")
+                .help(format!("the axes of this machine are {}", self.dialect.axis_list()))
+        };
+        let value = evaluate(expression, self).map_err(|fault| {
+            // A name that is nothing at all: an axis was meant, not a variable.
+            if fault.code == codes::UNDECLARED { no_axis("this is no axis of the machine") } else { fault }
+        });
+        match value? {
             Value::Axis(Some(axis)) => Ok(axis),
             Value::Axis(None) => {
                 Err(Fault::new(codes::TYPE_MISMATCH, expression.columns.clone(), "no axis is stored here")
                     .label("expected an axis"))
             }
-            _ => Err(Fault::new(codes::UNKNOWN_AXIS, expression.columns.clone(), "this is no axis")
-                .label("expected the name of an axis")
-                .help(format!("the axes of this machine are {}", self.dialect.axis_list()))),
+            _ => Err(no_axis("this is no axis")),
         }
     }
 }
