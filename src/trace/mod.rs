@@ -5,13 +5,24 @@
 //! notes. A signal keeps its own grid and its full original name; nothing is interpolated unless [`Signal::resampled`] is asked.
 //! Does not align or compare traces.
 
+mod faults;
 mod import;
+mod naming;
+mod operate;
+mod operate_frame;
 mod recording;
 mod resample;
+mod signal_map;
+mod sink;
+mod sniff;
+mod source;
+mod text;
 mod wire;
 
 pub use import::{ImportOptions, import};
 pub use resample::Method;
+pub use signal_map::{Quantity, Rule, SIGNAL_MAP, rule_for};
+pub use source::Progress;
 pub use wire::{
     AxisSignal, Clock, Meaning, Origin, Signal, TimeGrid, Trace, TraceEvent, TraceFormat, Zero, axis_signal_name,
 };

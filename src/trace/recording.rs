@@ -4,6 +4,7 @@
 //! Tool poses stay in the recording. Memory: 8 bytes a value; `only` keeps what is asked for.
 
 use super::import::ImportOptions;
+use super::sink::{Head, Layout};
 use super::wire::{Clock, Meaning, Origin, Signal, TimeGrid, Trace, TraceEvent, TraceFormat};
 use crate::base::units::NS_PER_S;
 use crate::base::{AxisKind, Diagnostic};
@@ -75,12 +76,20 @@ struct Column {
 
 /// Words by number, in the order of their first appearance.
 #[derive(Default)]
-struct Labels {
+pub(super) struct Labels {
     words: Vec<String>,
     places: BTreeMap<String, usize>,
 }
 
 impl Labels {
+    pub(super) fn len(&self) -> usize {
+        self.words.len()
+    }
+
+    pub(super) fn word(&self, place: usize) -> Option<&str> {
+        self.words.get(place).map(String::as_str)
+    }
+
     fn place(&mut self, word: &str) -> usize {
         if let Some(place) = self.places.get(word) {
             return *place;
@@ -162,25 +171,20 @@ impl Column {
     }
 
     fn push_path(&mut self, path: &PathMessage) {
-        let mut word = |text: &Option<String>| text.as_deref().map_or(f64::NAN, |text| self.labels.place(text) as f64);
-        // In the order of `PATH_FIELDS`.
-        let value = match self.field {
-            0 => word(&path.program),
-            1 => path.block.map_or(f64::NAN, |block| block as f64),
-            2 => path.line.map_or(f64::NAN, f64::from),
-            3 => path.s_mm.unwrap_or(f64::NAN),
-            4 => path.feed_mm_min.unwrap_or(f64::NAN),
-            5 => path.programmed_feed_mm_min.unwrap_or(f64::NAN),
-            6 => path.acceleration_mm_s2.unwrap_or(f64::NAN),
-            7 => path.jerk_mm_s3.unwrap_or(f64::NAN),
-            8 => word(&path.limit_axis),
-            9 => word(&path.limit_kind),
-            10 => path.buffered_blocks.map_or(f64::NAN, f64::from),
-            11 => path.contour_error_mm.unwrap_or(f64::NAN),
-            12 => path.rotary_only.map_or(f64::NAN, |only| f64::from(u8::from(only))),
-            _ => path.override_ratio.unwrap_or(f64::NAN),
-        };
+        let value = path_value(path, self.field, &mut self.labels);
         self.values.push(value);
+    }
+
+    fn head(self) -> Head {
+        Head {
+            original: self.name.clone(),
+            words: matches!(self.name.as_str(), "path.program" | "path.limit_axis" | "path.limit_kind"),
+            name: Some(self.name),
+            unit: self.unit,
+            discrete: self.discrete,
+            layout: Layout::Held,
+            ..Head::default()
+        }
     }
 
     fn finish(self, clock: Clock, times: TimeGrid) -> Signal {
@@ -201,4 +205,36 @@ impl Column {
 fn path_unit(field: &str) -> &'static str {
     let units = [("_mm_min", "mm/min"), ("_mm_s2", "mm/s^2"), ("_mm_s3", "mm/s^3"), ("_mm", "mm")];
     units.iter().find(|(ending, _)| field.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
+
+/// Field `field` of `PATH_FIELDS`; a word is told by its place among `labels`.
+pub(super) fn path_value(path: &PathMessage, field: usize, labels: &mut Labels) -> f64 {
+    let mut word = |text: &Option<String>| text.as_deref().map_or(f64::NAN, |text| labels.place(text) as f64);
+    match field {
+        0 => word(&path.program),
+        1 => path.block.map_or(f64::NAN, |block| block as f64),
+        2 => path.line.map_or(f64::NAN, f64::from),
+        3 => path.s_mm.unwrap_or(f64::NAN),
+        4 => path.feed_mm_min.unwrap_or(f64::NAN),
+        5 => path.programmed_feed_mm_min.unwrap_or(f64::NAN),
+        6 => path.acceleration_mm_s2.unwrap_or(f64::NAN),
+        7 => path.jerk_mm_s3.unwrap_or(f64::NAN),
+        8 => word(&path.limit_axis),
+        9 => word(&path.limit_kind),
+        10 => path.buffered_blocks.map_or(f64::NAN, f64::from),
+        11 => path.contour_error_mm.unwrap_or(f64::NAN),
+        12 => path.rotary_only.map_or(f64::NAN, |only| f64::from(u8::from(only))),
+        _ => path.override_ratio.unwrap_or(f64::NAN),
+    }
+}
+
+/// Heads of the fields of a topic.
+pub(super) fn field_heads(kind: &TopicKind, fields: &[usize]) -> Vec<Head> {
+    match kind {
+        TopicKind::Axis { name, kind } => {
+            fields.iter().map(|field| Column::of_axis(name, *kind, *field).head()).collect()
+        }
+        TopicKind::Path => (0..PATH_FIELDS.len()).map(|field| Column::of_path(field).head()).collect(),
+        _ => Vec::new(),
+    }
 }
