@@ -215,5 +215,6 @@ fn outcome(about: About, written: Written) -> ExportOutcome {
 
 /// The output cannot be written.
 pub(super) fn output_fault(error: &io::Error) -> Diagnostic {
-    Diagnostic::error("R0004", format!("the output cannot be written: {error}")).help("make room or choose another place")
+    Diagnostic::error("R0004", format!("the output cannot be written: {error}"))
+        .help("make room or choose another place")
 }

@@ -3,8 +3,12 @@
 //! In: a path, [`ImportOptions`]. Out: a [`Trace`] in memory, or its rows one after another for a sink. Errors say what the file is
 //! taken for and what is wrong with it. Does not look at the ending of the name.
 
+use super::csv::read_csv;
+use super::edge::read_edge;
+use super::measuring::read_measuring;
 use super::operate::read_operate;
 use super::recording::import_recording;
+use super::scope::{read_halsampler, read_halscope, read_twincat};
 use super::sink::{Memory, Sink};
 use super::source::{Progress, Source};
 use super::wire::{AxisSignal, Origin, Trace, TraceFormat};
@@ -60,7 +64,8 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Trace, Diagnostic>
     }
     let mut memory = Memory::new(&options.only);
     let about = read_rows(&source, format, options, &mut memory)?;
-    let (signals, events) = memory.finish();
+    let (signals, mut events) = memory.finish();
+    events.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
     Ok(Trace {
         name: source.shown.clone(),
         origin: about.origin,
@@ -81,9 +86,15 @@ pub(super) fn read_rows(
 ) -> Result<About, Diagnostic> {
     let mut about = match format {
         TraceFormat::OperateXml => read_operate(source, 0, options, sink)?,
-        _ => {
-            let message = format!("{} is {}, which cannot be read yet", source.shown, format.title());
-            return Err(Diagnostic::error("T0002", message));
+        TraceFormat::EdgeJson => read_edge(source, options, sink)?,
+        TraceFormat::Csv => read_csv(source, 0, options, sink)?,
+        TraceFormat::TwinCatCsv => read_twincat(source, 0, options, sink)?,
+        TraceFormat::Halscope => read_halscope(source, 0, options, sink)?,
+        TraceFormat::Halsampler => read_halsampler(source, 0, options, sink)?,
+        TraceFormat::MeasuringXml => read_measuring(source, 0, options, sink)?,
+        TraceFormat::Recording => {
+            let message = format!("{} is a recording in an archive", source.shown);
+            return Err(Diagnostic::error("T0018", message).help("unpack it, and name the recording"));
         }
     };
     if source.part_count() > 1 && format != TraceFormat::EdgeJson {

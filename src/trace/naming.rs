@@ -68,7 +68,20 @@ impl<'a> Naming<'a> {
 
     /// Head and factor of a signal.
     pub(super) fn head(&mut self, original: &str, named: &Named, period_s: Option<f64>) -> NamedHead {
-        let rule = rule_for(self.format, &named.stem);
+        let format = self.format;
+        self.head_in(format, original, named, period_s)
+    }
+
+    /// Head of a signal whose name is in the manner of another format: any name may stand in a table.
+    pub(super) fn head_of(&mut self, format: TraceFormat, original: &str, named: &Named) -> NamedHead {
+        let own = std::mem::replace(&mut self.format, format);
+        let head = self.head_in(format, original, named, None);
+        self.format = own;
+        head
+    }
+
+    fn head_in(&mut self, format: TraceFormat, original: &str, named: &Named, period_s: Option<f64>) -> NamedHead {
+        let rule = rule_for(format, &named.stem);
         let axis = self.axis(&named.axis);
         let kind = axis.as_ref().map_or(AxisKind::Linear, |(_, kind)| *kind);
         let (unit, factor) = rule.map_or(("", 1.0), |rule| unit_and_factor(rule.quantity, kind));

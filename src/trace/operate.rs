@@ -5,8 +5,9 @@
 
 use super::faults::Faults;
 use super::import::{About, ImportOptions};
+use super::instants::instant_s;
 use super::naming::{NamedHead, Naming, operate_name};
-use super::operate_frame::{Declared, Frame, start_of_day_s};
+use super::operate_frame::{Declared, Frame};
 use super::sink::{Layout, Memory, Sink};
 use super::source::{PartReader, Source};
 use super::text::TOO_LONG;
@@ -128,7 +129,7 @@ impl<'s, 'o> Session<'s, 'o> {
             let message = format!("{} has {TOO_LONG}", self.source.part_name(self.part));
             return Err(self.at(Diagnostic::error("T0005", message), at, "it begins here"));
         }
-        let at_end = std::io::BufRead::fill_buf(reader.get_mut()).map_or(false, |left| left.is_empty());
+        let at_end = std::io::BufRead::fill_buf(reader.get_mut()).is_ok_and(|left| left.is_empty());
         if at_end && self.rows > 0 {
             return Ok(true);
         }
@@ -193,7 +194,7 @@ impl<'s, 'o> Session<'s, 'o> {
         if self.frame.number == 0 {
             self.remember(tag, &["startTime", "dropOuts", "stopInc"]);
         }
-        let start_s = attribute(tag, "startTime").as_deref().and_then(start_of_day_s);
+        let start_s = attribute(tag, "startTime").as_deref().and_then(instant_s);
         let drop_outs = attribute(tag, "dropOuts").and_then(|text| text.parse().ok()).unwrap_or(0_u64);
         self.frame.drop_outs += drop_outs;
         let gap = self.frame.begin(start_s, self.period_s());
@@ -449,7 +450,6 @@ impl<'s, 'o> Session<'s, 'o> {
             origin: Origin { format: TraceFormat::OperateXml, description, start_utc },
             metadata: BTreeMap::from([("operate".to_owned(), self.metadata)]),
             notes,
-            ..About::default()
         })
     }
 }

@@ -4,7 +4,6 @@
 //! its position and speed. Does not read XML.
 
 use super::wire::{Signal, TimeGrid};
-use crate::base::units::S_PER_MIN;
 use crate::base::{AxisKind, Diagnostic};
 
 /// A `dataSignal`.
@@ -111,23 +110,6 @@ impl Frame {
         }
         None
     }
-}
-
-/// `2026-06-03T17:57:40.613Z` in seconds, counted from the year 0 of the proleptic Gregorian calendar.
-pub(super) fn start_of_day_s(text: &str) -> Option<f64> {
-    let (date, time) = text.trim().trim_end_matches('Z').split_once('T')?;
-    let mut date = date.splitn(3, '-').map(|part| part.parse::<i64>().ok());
-    let (year, month, day) = (date.next()??, date.next()??, date.next()??);
-    let mut time = time.splitn(3, ':').map(|part| part.parse::<f64>().ok());
-    let (hour, minute, second) = (time.next()??, time.next()??, time.next()??);
-    if !(0..=9999).contains(&year) || !(1..=12).contains(&month) || !(1..=31).contains(&day) {
-        return None;
-    }
-    // Years begin in March, so that the leap day is the last.
-    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    let days =
-        365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400) + (153 * month + 2) / 5 + day;
-    Some((days as f64 * 24.0 + hour) * S_PER_MIN * S_PER_MIN + minute * S_PER_MIN + second)
 }
 
 /// Linear or rotary: the control writes the speed in mm/min or in rev/min. The signals were read as those of a linear axis.

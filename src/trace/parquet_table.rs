@@ -100,7 +100,8 @@ fn write_group<W: Write + Send>(
 }
 
 fn schema(names: Vec<String>, heads: &[Head]) -> Result<Type, ParquetError> {
-    let time = Type::primitive_type_builder("time_s", Physical::DOUBLE).with_repetition(Repetition::REQUIRED).build()?;
+    let time =
+        Type::primitive_type_builder("time_s", Physical::DOUBLE).with_repetition(Repetition::REQUIRED).build()?;
     let mut fields = vec![Arc::new(time)];
     for (name, head) in names.iter().zip(heads) {
         let builder = if head.words {

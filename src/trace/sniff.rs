@@ -39,6 +39,13 @@ pub(super) fn format_of(text: &str, shown: &str) -> Result<TraceFormat, Diagnost
     if start.lines().take(LINES_MAX).any(|line| line.contains([',', ';', '\t'])) {
         return Ok(TraceFormat::Csv);
     }
+    let blanks = |line: &&str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        words.len() > 1 && words.iter().all(|word| word.parse::<f64>().is_ok())
+    };
+    if start.lines().take(LINES_MAX).filter(blanks).count() > 2 {
+        return Ok(TraceFormat::Csv);
+    }
     // A table of one column needs no separator.
     let numbers = start.lines().take(LINES_MAX).filter(|line| line.trim().parse::<f64>().is_ok()).count();
     if numbers > 2 { Ok(TraceFormat::Csv) } else { Err(unknown(shown, "text, but no table")) }

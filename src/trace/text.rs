@@ -11,7 +11,7 @@ const ITEM_BYTES_MAX: u64 = 4 << 20;
 const BUFFER_BYTES: usize = 128 * 1024;
 
 /// The error text that says that an item is too long.
-pub(super) const TOO_LONG: &str = "a tag or line of more than 4 MiB";
+pub(super) const TOO_LONG: &str = "a tag, text or line that is too long";
 
 /// Windows-1252 where it differs from Latin-1: 0x80 to 0x9f; undefined places keep their number.
 const WINDOWS_1252: [char; 32] = [
@@ -37,6 +37,7 @@ pub(super) struct TextReader<R> {
     /// Decoded bytes that were consumed.
     consumed: u64,
     item_start: u64,
+    item_bytes_max: u64,
     ended: bool,
     /// Bytes that were taken as Windows-1252.
     replaced: u64,
@@ -52,9 +53,20 @@ impl<R: Read> TextReader<R> {
             at: 0,
             consumed: 0,
             item_start: 0,
+            item_bytes_max: ITEM_BYTES_MAX,
             ended: false,
             replaced: 0,
         }
+    }
+
+    /// For a text that is not read tag by tag or line by line.
+    pub(super) fn unlimited(self) -> Self {
+        Self { item_bytes_max: u64::MAX, ..self }
+    }
+
+    /// Another length of one item.
+    pub(super) fn with_item_limit(self, item_bytes_max: u64) -> Self {
+        Self { item_bytes_max, ..self }
     }
 
     /// From here on a new tag or line is counted.
@@ -209,7 +221,7 @@ impl<R: Read> Read for TextReader<R> {
 
 impl<R: Read> BufRead for TextReader<R> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.consumed - self.item_start > ITEM_BYTES_MAX {
+        if self.consumed - self.item_start > self.item_bytes_max {
             return Err(io::Error::other(TOO_LONG));
         }
         if self.at == self.text.len() && !self.ended {
