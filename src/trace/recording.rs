@@ -9,8 +9,8 @@ use super::source::Progress;
 use super::wire::{Clock, Meaning, Origin, Signal, TimeGrid, Trace, TraceEvent, TraceFormat, Zero};
 use crate::base::units::NS_PER_S;
 use crate::base::{AxisKind, Diagnostic};
-use crate::recorder::schema::SIGNAL_TOPIC_PREFIX;
 use crate::recorder::schema::proto::sollwert::{Path as PathMessage, Sample};
+use crate::recorder::schema::{FLAGS_FIELD, MONITORING_FIELD, SIGNAL_TOPIC_PREFIX};
 use crate::recorder::{
     ABOUT_METADATA, AXIS_FIELDS, AxisSample, Content, Message, PATH_FIELDS, Recording, TopicKind, UNITS_METADATA,
 };
@@ -238,7 +238,7 @@ impl Column {
             unit: entry.unit_name(kind).to_owned(),
             values: Vec::new(),
             labels: Labels::default(),
-            discrete: entry.stem == "flags",
+            discrete: matches!(field, FLAGS_FIELD | MONITORING_FIELD),
         }
     }
 

@@ -13,7 +13,8 @@ use crate::base::units::NS_PER_S;
 use crate::base::{AxisKind, Diagnostic};
 use crate::recorder::schema::proto::sollwert::Sample;
 use crate::recorder::schema::{
-    AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, LINEAR_AXIS, RECORDING_FORMAT, ROTARY_AXIS, SAMPLE, SIGNAL_TOPIC_PREFIX,
+    AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, MONITORING_FIELD, RECORDING_FORMAT, ROTARY_AXIS,
+    SAMPLE, SIGNAL_TOPIC_PREFIX,
 };
 use crate::recorder::{ABOUT_METADATA, AXES_METADATA, AXIS_FIELDS, Compression, Target, write_fault, write_options};
 use mcap::McapResult;
@@ -30,8 +31,6 @@ const FILLED_AT_ONCE_MAX: u64 = 4_000_000;
 const OFF_GRID_SHARE: f64 = 0.01;
 /// Bytes after which a chunk ends.
 const CHUNK_BYTES: usize = 1 << 20;
-/// Place of `flags` among the fields: the one that is no double.
-const FLAGS_STEM: &str = "flags";
 
 /// Writes a recording.
 pub(super) struct ToRecording {
@@ -171,7 +170,7 @@ impl ToRecording {
             fields.iter().zip(signals.iter()).zip(values.iter()).filter(|(_, v)| !v.is_nan())
         {
             match field {
-                Some(field) if AXIS_FIELDS[*field].stem == FLAGS_STEM => {
+                Some(field) if matches!(*field, FLAGS_FIELD | MONITORING_FIELD) => {
                     prost::encoding::uint32::encode(*field as u32 + 1, &(*value as u32), &mut self.buffer);
                 }
                 Some(field) => prost::encoding::double::encode(*field as u32 + 1, value, &mut self.buffer),
