@@ -7,7 +7,7 @@
 use super::decode::{AxisSample, TopicKind};
 use super::reader::Recording;
 use super::schema::proto::sollwert::Path as PathMessage;
-use super::schema::{AXIS_FIELDS, FLAGS_FIELD, PATH_FIELDS};
+use super::schema::{AXIS_FIELDS, FLAGS_FIELD, MONITORING_FIELD, PATH_FIELDS};
 use super::target::{Target, WholeFile};
 use crate::base::Diagnostic;
 use crate::base::units::NS_PER_S;
@@ -29,10 +29,6 @@ pub struct ExportReport {
 /// Writes a table to a file, by the ending of its name. The file appears when it is complete.
 pub fn export(recording: &Recording, output: &Path) -> Result<ExportReport, Diagnostic> {
     let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
-    if ending == "parquet" {
-        let message = format!("{} cannot be written: Parquet is not supported yet", output.display());
-        return Err(Diagnostic::error("R0017", message).help("export to a name that ends in .csv"));
-    }
     if ending != "csv" && !output.exists() {
         let message = format!("the format of {} is not known", output.display());
         return Err(Diagnostic::error("R0017", message).help("export to a name that ends in .csv"));
@@ -101,6 +97,8 @@ fn write_csv(recording: &Recording, output: &mut impl Write) -> Result<ExportRep
 struct Cells {
     topic: usize,
     fields: Vec<usize>,
+    /// Last value of each field of an axis: a field may be recorded less often than others.
+    held: Vec<Option<f64>>,
     text: Vec<u8>,
 }
 
@@ -198,15 +196,18 @@ impl Table {
 impl Cells {
     /// Empty until the first message.
     fn empty(topic: usize, fields: Vec<usize>) -> Self {
-        Self { topic, text: vec![b','; fields.len()], fields }
+        Self { topic, text: vec![b','; fields.len()], held: vec![None; fields.len()], fields }
     }
 
     fn set_axis(&mut self, sample: &AxisSample) {
         self.text.clear();
-        for &field in &self.fields {
+        for (&field, held) in self.fields.iter().zip(&mut self.held) {
             self.text.push(b',');
-            match sample.get(field) {
-                Some(flags) if field == FLAGS_FIELD => push_integer(&mut self.text, flags as u64),
+            *held = sample.get(field).or(*held);
+            match *held {
+                Some(bits) if matches!(field, FLAGS_FIELD | MONITORING_FIELD) => {
+                    push_integer(&mut self.text, bits as u64);
+                }
                 Some(value) => push_number(&mut self.text, value),
                 None => {}
             }
@@ -266,7 +267,7 @@ impl<'a> Cell<'a> {
 }
 
 /// The shortest decimal that reads back to the same f64: without `.0`.
-fn push_number(line: &mut Vec<u8>, value: f64) {
+pub(crate) fn push_number(line: &mut Vec<u8>, value: f64) {
     let mut buffer = ryu::Buffer::new();
     let text = buffer.format(value);
     line.extend_from_slice(text.strip_suffix(".0").unwrap_or(text).as_bytes());
@@ -277,7 +278,7 @@ fn push_integer(line: &mut Vec<u8>, value: u64) {
 }
 
 /// A text as RFC 4180 has it: in quotation marks where it holds a comma, a quotation mark or a line end.
-fn push_text(line: &mut String, text: &str) {
+pub(crate) fn push_text(line: &mut String, text: &str) {
     if !text.contains([',', '"', '\n', '\r']) {
         line.push_str(text);
         return;

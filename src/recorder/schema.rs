@@ -23,6 +23,8 @@ pub const EVENT_TOPIC: &str = "/event";
 pub const TOOL_TOPICS: [&str; 2] = ["/tool/setpoint", "/tool/actual"];
 /// What the topics of the axes begin with; the name of the axis follows.
 pub const AXIS_TOPIC_PREFIX: &str = "/axis/";
+/// What the topics of other signals of imported traces begin with; the name in the file follows.
+pub const SIGNAL_TOPIC_PREFIX: &str = "/signal/";
 /// Frame of the tool poses: the basic coordinate system, in which the part stands still.
 pub const POSE_FRAME: &str = "part";
 
@@ -64,6 +66,9 @@ pub const PATH: SchemaText =
 /// Schema of the events.
 pub const EVENT: SchemaText =
     SchemaText { name: "sollwert.Event", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/event.fds")) };
+/// Schema of the signals of imported traces that are none of an axis.
+pub const SAMPLE: SchemaText =
+    SchemaText { name: "sollwert.Sample", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/sample.fds")) };
 /// Schema of the tool poses.
 pub const POSE_IN_FRAME: SchemaText = SchemaText {
     name: "foxglove.PoseInFrame",
@@ -73,10 +78,13 @@ pub const POSE_IN_FRAME: SchemaText = SchemaText {
 const AXIS_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/axis.fds"));
 
 /// Number of fields of an axis message.
-pub const AXIS_FIELD_COUNT: usize = 23;
+pub const AXIS_FIELD_COUNT: usize = 25;
 
-/// Place of `flags` in [`AXIS_FIELDS`]: the one field that is an integer.
-pub const FLAGS_FIELD: usize = AXIS_FIELD_COUNT - 1;
+/// Place of `flags` in [`AXIS_FIELDS`], which is an integer.
+pub const FLAGS_FIELD: usize = 22;
+
+/// Place of `monitoring` in [`AXIS_FIELDS`], which is an integer.
+pub const MONITORING_FIELD: usize = 24;
 
 /// Fields of `sollwert.Path` in the order of the columns of an export.
 pub const PATH_FIELDS: [&str; 14] = [
@@ -217,4 +225,6 @@ pub const AXIS_FIELDS: [AxisField; AXIS_FIELD_COUNT] = [
     motor_field!("current_mean", "current_mean_a", "A", |_, d| d.current_mean_a),
     motor_field!("voltage", "voltage_v", "V", |_, d| d.voltage_v),
     motor_field!("flags", "flags", "bits", |_, d| f64::from(d.flags)),
+    length_field!("contour_deviation", "", "", Drive, |_, d| d.contour_deviation_lu),
+    motor_field!("monitoring", "monitoring", "bits", |_, d| f64::from(d.monitoring)),
 ];
