@@ -14,7 +14,7 @@ use super::{Limit, LimitKind, blend_limits, printed_arc};
 use crate::base::{AxisId, PerAxis};
 use crate::geometry::{Curve, HermiteBlend};
 use crate::interpreter::{Feed, Modes, ProgrammedLimits};
-use crate::kinematics::JointState;
+use crate::kinematics::{JointPath, JointState};
 use crate::machine::{
     AccelerationMode, ArcLimits, AxisLimits, BlendLaw, BlendLimits, CornerRule, CurvatureJump, FeedSettings, Machine,
 };
@@ -113,6 +113,9 @@ pub(super) struct Ends {
     pub rotary_only: bool,
 }
 
+/// By how much the share of an axis may be greater between three places of a curve.
+const SHARE_BETWEEN_RATIO: f64 = 1.3;
+
 /// Which jerk of an axis holds.
 type JerkMax = fn(&AxisLimits) -> f64;
 
@@ -180,14 +183,23 @@ impl AxisRules {
 
     /// The rules that hold from end to end of a piece, whatever its speed: under DRIVE the full acceleration where F keeps every axis
     /// below the velocity from which it is lower, the lower one elsewhere.
-    pub(super) fn throughout(&self, feed: &FeedCap) -> &Self {
-        match (&self.drive, feed) {
-            (None, _) => self,
-            (Some(drive), FeedCap::Rapid) => &drive.weak,
-            (Some(drive), FeedCap::Programmed(cap)) => {
-                let slowest_lu_s = drive.slow.feed_velocities_max_lu_s.iter().copied().fold(f64::INFINITY, f64::min);
-                if cap.velocity_lu_s <= slowest_lu_s { self } else { &drive.weak }
+    pub(super) fn throughout(&self, path: &JointPath) -> &Self {
+        let (Some(drive), Some(curve)) = (&self.drive, path.contour.curve()) else { return self };
+        let FeedCap::Programmed(cap) = self.feed_cap(&path.contour.feed, curve) else { return &drive.weak };
+        let states = [0.0, 0.5, 1.0].map(|share| path.at(share * path.length_lu()));
+        let between_ratio = if path.is_straight() { 1.0 } else { SHARE_BETWEEN_RATIO };
+        let share = |axis: AxisId| {
+            // s is the way of the linear axes: none of them moves faster.
+            if path.is_contour() && self.linear[axis] {
+                return 1.0;
             }
+            between_ratio * states.iter().fold(0.0_f64, |most, state| most.max(state.first[axis].abs()))
+        };
+        let mut axes = AxisId::first(self.axes.len()).zip(&drive.slow.axes);
+        if axes.all(|(id, limits)| share(id) * cap.velocity_lu_s <= limits.velocity_max_lu_s) {
+            self
+        } else {
+            &drive.weak
         }
     }
 

@@ -75,7 +75,7 @@ impl PathRules {
             self.before.as_ref().map_or(junction::STOP, |(before, its)| junction::cap([its, &rules], before, &ends));
         let feed = rules.feed_cap(&contour.feed, curve);
         let piece = PieceRules {
-            axes: rules.caps(&feed, in_blend),
+            axes: rules.caps(path, &feed, in_blend),
             feed_lu_s: match feed {
                 FeedCap::Rapid => None,
                 FeedCap::Programmed(cap) => Some(cap.velocity_lu_s),
@@ -90,8 +90,8 @@ impl PathRules {
 
 impl AxisRules {
     /// What every axis may do in a feed motion or rapid, in a block or blend.
-    fn caps(&self, feed: &FeedCap, in_blend: bool) -> Vec<AxisCaps> {
-        let rules = self.throughout(feed);
+    fn caps(&self, path: &JointPath, feed: &FeedCap, in_blend: bool) -> Vec<AxisCaps> {
+        let rules = self.throughout(path);
         let caps = |(limits, feed_velocity_lu_s): (&crate::machine::AxisLimits, &f64)| AxisCaps {
             velocity_max_lu_s: match feed {
                 FeedCap::Rapid => limits.velocity_max_lu_s * self.rapid_override_ratio,

@@ -141,6 +141,7 @@ impl Planning {
                 return if start == Start::Rest { slowed(chain, profile, &range, look) } else { None };
             }
             self.take_estimate(&profile, &range);
+            self.cap_rests(chain, start);
             before = None;
         }
         None
@@ -157,10 +158,7 @@ impl Planning {
             (own * own).min(chain.junctions[i].speed_squared_lu2_s2)
         }));
         let count = last - first;
-        if start == Start::Rest {
-            self.caps[0] = self.caps[0].min(ray_cap(&intervals[0]));
-        }
-        self.caps[count] = self.caps[count].min(ray_cap(&intervals[last]));
+        self.cap_rests(chain, start);
         self.estimate.clear();
         for i in first..=last {
             let mut b = self.caps[i - first];
@@ -190,6 +188,17 @@ impl Planning {
         }
         self.estimate.iter().chain(&self.caps).all(|b| *b > 0.0 && !b.is_nan())
             && self.estimate.iter().all(|b| b.is_finite())
+    }
+
+    /// What the intervals of start and stop allow at their moving ends.
+    fn cap_rests(&mut self, chain: &Chain, start: Start) {
+        let at_start = (start == Start::Rest).then(|| chain.intervals.first()).flatten();
+        let ends = [self.caps.len().saturating_sub(1), 0];
+        for (place, interval) in ends.into_iter().zip([chain.intervals.last(), at_start]) {
+            if let (Some(cap), Some(interval)) = (self.caps.get_mut(place), interval) {
+                *cap = cap.min(ray_cap(interval));
+            }
+        }
     }
 
     fn take_estimate(&mut self, profile: &Profile, range: &std::ops::Range<usize>) {

@@ -36,6 +36,9 @@ const INTERVALS_MAX: usize = 20_000;
 /// The interval at a rest is at most this share of its piece.
 const REST_SHARE: f64 = 0.15;
 
+/// How often it is halved to find a smooth one.
+const REST_CUTS_MAX: usize = 16;
+
 /// Intervals are short up to this share beyond the way that a change is expected to take.
 const SETTLED_SHARE: f64 = 0.3;
 
@@ -129,13 +132,8 @@ struct Cutter<'a> {
 impl Grid {
     /// Cuts a stretch of `path`, which moves and has no step of direction or curvature inside.
     pub fn new(rules: &AxisRules, path: &JointPath, blend: bool, stretch: Stretch) -> Self {
-        Cutter::new(throughout(rules, path), path, blend, stretch).cut()
+        Cutter::new(rules.throughout(path), path, blend, stretch).cut()
     }
-}
-
-/// One set of rules for the whole piece.
-pub(super) fn throughout<'a>(rules: &'a AxisRules, path: &JointPath) -> &'a AxisRules {
-    path.contour.curve().map_or(rules, |curve| rules.throughout(&rules.feed_cap(&path.contour.feed, curve)))
 }
 
 /// Highest constant speed at a place: feed and axis velocities, and the bend.
@@ -152,7 +150,7 @@ pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &D
 
 /// About the highest speeds at both ends of a piece: from its slow places on they grow with constant jerk.
 pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
-    let rules = throughout(rules, path);
+    let rules = rules.throughout(path);
     let length_lu = path.length_lu();
     let state_at = |s_lu: f64| Derivatives::from(path.at(s_lu));
     let speed_at = |s_lu: f64| constant_speed_lu_s(rules, path, &state_at(s_lu));
@@ -206,9 +204,10 @@ impl<'a> Cutter<'a> {
         let mut borders = vec![from_lu];
         let rests = ends.map(|end| end == End::Rest);
         if rests[0] {
-            borders.push(from_lu + self.rest_lu());
+            borders.push(from_lu + self.rest_lu(from_lu, 1.0));
         }
-        let inside = [borders[borders.len() - 1], to_lu - if rests[1] { self.rest_lu() } else { 0.0 }];
+        let stop_lu = if rests[1] { self.rest_lu(to_lu, -1.0) } else { 0.0 };
+        let inside = [borders[borders.len() - 1], to_lu - stop_lu];
         let knots: Vec<f64> = match self.path.contour.curve() {
             // Also where the quadrature had to be cut: there the curve changes most, if only over a thousandth of it.
             Some(Curve::Polynomial(curve)) if self.path.is_contour() => curve.nodes_lu().collect(),
@@ -217,7 +216,7 @@ impl<'a> Cutter<'a> {
         };
         borders.extend(knots.into_iter().filter(|s_lu| *s_lu > inside[0] && *s_lu < inside[1]));
         if rests[1] {
-            borders.push(to_lu - self.rest_lu());
+            borders.push(to_lu - stop_lu);
         }
         borders.push(to_lu);
         for range in borders.windows(2) {
@@ -226,15 +225,22 @@ impl<'a> Cutter<'a> {
         self.drop_idle_axes();
         let half_lu = 0.5 * self.stretch.length_lu();
         let v = ends.iter().fold(self.top_lu_s, |v, end| v.min(self.reached_lu_s(*end, half_lu)));
-        let stop_lu = self.tangent.stop_lu(v);
-        Grid { intervals: self.intervals, rests, stop_lu }
+        let way_lu = self.tangent.stop_lu(v);
+        Grid { intervals: self.intervals, rests, stop_lu: way_lu }
     }
 
-    /// Length of the interval at a rest.
-    fn rest_lu(&self) -> f64 {
+    /// Length of the interval at a rest, from there in this direction; shorter where the curve changes fast.
+    fn rest_lu(&self, rest_lu: f64, direction: f64) -> f64 {
         let Tangent { acceleration_lu_s2, jerk_lu_s3, step_s: t, jerk_limited } = self.tangent;
         let lu = if jerk_limited { jerk_lu_s3 * t.powi(3) / 6.0 } else { acceleration_lu_s2 * t * t / 2.0 };
-        lu.min(REST_SHARE * self.stretch.length_lu())
+        let longest_lu = lu.min(REST_SHARE * self.stretch.length_lu());
+        let smooth = |length_lu: &f64| {
+            let [from, middle, to] = [0.0, 0.5, 1.0].map(|share| self.look(rest_lu + direction * share * length_lu));
+            self.smooth(&from, &middle, &to)
+        };
+        let mut shorter =
+            std::iter::successors(Some(longest_lu), |length_lu| Some(0.5 * length_lu)).take(REST_CUTS_MAX);
+        shorter.find(smooth).unwrap_or(longest_lu)
     }
 
     fn cut_range(&mut self, start_lu: f64, end_lu: f64) {

@@ -9,7 +9,7 @@
 
 use super::Piece;
 use super::chain::PathPoint;
-use super::grid::{constant_speed_lu_s, throughout};
+use super::grid::constant_speed_lu_s;
 use super::interval::{Bounds, Derivatives, FASTER_MAX_RATIO, Interval, Tangent};
 use crate::base::PerAxis;
 use crate::feed::limits::AxisRules;
@@ -65,7 +65,7 @@ impl Brief {
     pub fn new(rules: &AxisRules, path: &JointPath, tangent: &Tangent, ends: [Derivatives; 2]) -> Option<Self> {
         let curve = path.contour.curve().filter(|_| path.is_contour())?;
         let length_lu = path.length_lu();
-        let rules = throughout(rules, path);
+        let rules = rules.throughout(path);
         let speed_at = |state: &Derivatives| constant_speed_lu_s(rules, path, state);
         let mut speed_lu_s = speed_at(&ends[0]);
         let fits = |speed_lu_s: f64| length_lu <= speed_lu_s * tangent.step_s;

@@ -5,6 +5,7 @@
 //! Does not plan.
 
 use super::chain::{Chain, Look, PathPoint, Profile};
+use super::estimate::ray_exponent;
 use super::interval::{AxisBound, Derivatives, Interval};
 use crate::feed::{Limit, LimitKind};
 
@@ -205,9 +206,11 @@ pub(super) fn slowed(
     range: &std::ops::Range<usize>,
     look: &Look<'_>,
 ) -> Option<Profile> {
+    let at_rest = [0, range.end].map(|index| used_at_rest(chain, &profile, index, look));
     let most = range
         .clone()
         .map(|index| used_inside(chain, &profile, index, look))
+        .chain(at_rest)
         .fold(0.0_f64, |most, used| if used.is_nan() { used } else { most.max(used) });
     if most.is_nan() || most > SLOWED_MAX_RATIO {
         return None;
@@ -231,10 +234,54 @@ pub(super) fn tighten(chain: &mut Chain, profile: &Profile, range: &std::ops::Ra
         }
         holds = false;
         let ratio = if most.is_nan() { 0.5 } else { (TIGHTER_RATIO / most).max(0.5) };
-        chain.intervals[index].reserve_ratio *= ratio;
-        chain.intervals[index].tightened = true;
+        chain.intervals[index].tighten(ratio);
+    }
+    let starts = (range.start == 1).then_some(0);
+    for index in starts.into_iter().chain([range.end]) {
+        let most = used_at_rest(chain, profile, index, look);
+        if most > HELD_RATIO || most.is_nan() {
+            holds = false;
+            let ratio = if most.is_nan() { 0.5 } else { (TIGHTER_RATIO / most).max(0.5) };
+            chain.intervals[index].tighten(ratio);
+        }
     }
     holds
+}
+
+/// How much of its limits the interval of a start (the first) or a stop uses at most, where b goes with a power of the way from the rest.
+fn used_at_rest(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
+    let Some(interval) = chain.intervals.get(index).filter(|interval| !interval.is_straight()) else { return 0.0 };
+    let rough = most_used_at_rest(chain, profile, index, &interval.eighths(None));
+    if rough < NEAR_RATIO || rough.is_nan() {
+        return rough;
+    }
+    let mut eighths = interval.eighths(None);
+    for eighth in [1, 2, 3, 5, 6, 7] {
+        eighths[eighth] = look(index, interval.start_lu + 0.125 * eighth as f64 * interval.length_lu());
+    }
+    most_used_at_rest(chain, profile, index, &eighths)
+}
+
+fn most_used_at_rest(chain: &Chain, profile: &Profile, index: usize, states: &[Derivatives; 9]) -> f64 {
+    let interval = &chain.intervals[index];
+    let (h, power) = (interval.length_lu(), ray_exponent(interval));
+    let [from, to] = [index, index + 1].map(|border| profile.points[border].speed_squared_lu2_s2);
+    let (b_end, sign) = if from <= 0.0 { (to, 1.0) } else { (from, -1.0) };
+    let mut most = 0.0_f64;
+    for eighth in 1..=8 {
+        let share = 0.125 * eighth as f64;
+        let state = &states[if sign > 0.0 { eighth } else { 8 - eighth }];
+        let b = b_end * share.powf(power);
+        let slope_lu_s2 = sign * power * b / (share * h);
+        let bend = power * (power - 1.0) * b / (share * h).powi(2);
+        for (used, _) in used(interval, state, &PathPoint { speed_squared_lu2_s2: b, slope_lu_s2 }, bend) {
+            if used.is_nan() {
+                return f64::NAN;
+            }
+            most = most.max(used);
+        }
+    }
+    most
 }
 
 fn positive(point: &PathPoint) -> bool {

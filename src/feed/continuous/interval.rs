@@ -126,6 +126,12 @@ impl Interval {
         ]
     }
 
+    /// Planning uses less of its limits from now on.
+    pub fn tighten(&mut self, ratio: f64) {
+        self.reserve_ratio *= ratio;
+        self.tightened = true;
+    }
+
     /// The derivatives are the same all along.
     pub fn is_straight(&self) -> bool {
         self.straight
@@ -239,30 +245,23 @@ impl Bounds {
         top_lu_s: f64,
         acceleration_lu_s2: f64,
     ) -> Self {
-        let demand = |bound: &AxisBound| {
-            let mut most = [0.0_f64; 3];
-            for state in states.clone() {
-                let shares = [&state.first, &state.second, &state.third].map(|derivative| derivative[bound.axis].abs());
-                most.iter_mut().zip(shares).for_each(|(most, share)| *most = most.max(share));
-            }
-            let jerk = bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
-            let (v, a, j) = (top_lu_s, bound.acceleration_lu_s2, jerk);
-            [
-                most[0] / a,
-                most[0] / j,
-                v * v * most[1] / a,
-                (v.powi(3) * most[2]) / j,
-                v * acceleration_lu_s2 * most[1] / j,
-            ]
+        let v = top_lu_s;
+        let demand = |bound: &AxisBound, state: &Derivatives| {
+            let [first, second, third] =
+                [&state.first, &state.second, &state.third].map(|derivative| derivative[bound.axis].abs());
+            let (a, j) = (bound.acceleration_lu_s2, bound.jerk_lu_s3.unwrap_or(f64::INFINITY));
+            [first / a, first / j, v * v * second / a, v.powi(3) * third / j, v * acceleration_lu_s2 * second / j]
         };
-        let mut tops = [0.0, 0.0, 1.0, 1.0, 1.0_f64];
-        for bound in &self.axes {
-            let demand = demand(bound);
-            tops[0] = tops[0].max(demand[0]);
-            tops[1] = tops[1].max(demand[1]);
-        }
-        let idle = |demand: [f64; 5]| demand.iter().zip(tops).all(|(demand, top)| *demand <= IDLE_SHARE * top);
-        let axes = self.axes.iter().filter(|bound| !idle(demand(bound))).copied().collect();
+        // Each place by itself: where an axis begins to move another one leads.
+        let idle = |bound: &AxisBound| {
+            states.clone().all(|state| {
+                let top =
+                    |order: usize| self.axes.iter().map(|bound| demand(bound, state)[order]).fold(0.0_f64, f64::max);
+                let tops = [top(0), top(1), 1.0, 1.0, 1.0];
+                demand(bound, state).iter().zip(tops).all(|(demand, top)| *demand <= IDLE_SHARE * top)
+            })
+        };
+        let axes = self.axes.iter().filter(|bound| !idle(bound)).copied().collect();
         Self { axes, ..*self }
     }
 

@@ -29,7 +29,7 @@ use crate::interpreter::Feed;
 use crate::kinematics::{JointPath, JointState};
 use chain::{Chain, PathPoint, Planning, Profile, Start};
 pub(super) use change::Change;
-use grid::{End, Grid, throughout};
+use grid::{End, Grid};
 use group::{Brief, Stretch};
 use interval::{Derivatives, Tangent};
 use layout::{Layout, Place};
@@ -113,7 +113,7 @@ impl Flow {
     /// A piece that moves; its curve has no step of direction or curvature inside. `ends`: the states there.
     pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool, ends: [&JointState; 2]) -> Self {
         let ends = ends.map(|state| Derivatives::from(*state));
-        let tangent = Tangent::between(throughout(&rules, path), blend, [&ends[0].first, &ends[1].first]);
+        let tangent = Tangent::between(rules.throughout(path), blend, [&ends[0].first, &ends[1].first]);
         let brief = if blend { None } else { Brief::new(&rules, path, &tangent, ends).map(Box::new) };
         let ends_lu_s = match &brief {
             Some(brief) => [brief.speed_lu_s; 2],
