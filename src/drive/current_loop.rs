@@ -51,6 +51,11 @@ impl CurrentLoop {
         VoltageCommand { voltage_v, clamped }
     }
 
+    /// What the box remembers from cycle to cycle.
+    pub(super) fn memory<'a>(&'a mut self, list: &mut Vec<&'a mut f64>) {
+        list.push(&mut self.integral_v);
+    }
+
     /// The integral is a number.
     pub(super) fn is_finite(&self) -> bool {
         self.integral_v.is_finite()

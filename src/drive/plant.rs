@@ -2,19 +2,18 @@
 //!
 //! In: voltage and gravity torque, constant over a tick. Out: the state after the tick. The solution is the exact one of the
 //! hybrid system: a tick in which the axis stops, reverses or breaks away is split at that instant ([`Plant::pieces`]).
-//! Does not know compliance, backlash or vibration; what is not modelled is absorbed by the balancing delay.
+//! Rigid: a load behind a spring is `second_mass`, play is `backlash`; what is not modelled is absorbed by the balancing delay.
 //!
 //! Assumes that a tick is shorter than half a period of the electro-mechanical oscillation sqrt(Kt Ke / (L J)), which is some
 //! hundred ticks in any real drive: then the acceleration changes its sign at most once in a tick and no stop is overlooked.
 
+use super::integral::falling_zero;
 use super::transition::{Excess, Transition};
 use crate::machine::{DriveData, MechanicsData, MotorData};
 
 /// More stops and breakaways than one tick can hold. They cannot follow each other closely, because u is constant in a tick and
 /// the current tends to one value; the bound only ends the loop where rounding makes the axis rest and move in turn.
 const PIECES_MAX: u32 = 16;
-/// Newton steps and bisections in the search for an instant. Bisection alone needs 52 to the last bit.
-const SEARCH_STEPS_MAX: u32 = 64;
 
 /// i, w, th.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -311,25 +310,4 @@ impl Moving<'_> {
             (state.speed_rad_s * self.side, slope_rad_s2 * self.side)
         })
     }
-}
-
-/// Zero of a function that is positive at `low_s` and not at `high_s`: Newton, kept inside the bracket by bisection. `function`
-/// gives value and slope.
-fn falling_zero(mut low_s: f64, mut high_s: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut time_s = 0.5 * (low_s + high_s);
-    for _ in 0..SEARCH_STEPS_MAX {
-        let (value, slope) = function(time_s);
-        if value > 0.0 {
-            low_s = time_s;
-        } else {
-            high_s = time_s;
-        }
-        let newton_s = time_s - value / slope;
-        let next_s = if newton_s > low_s && newton_s < high_s { newton_s } else { 0.5 * (low_s + high_s) };
-        if (next_s - time_s).abs() <= f64::EPSILON * high_s {
-            return next_s;
-        }
-        time_s = next_s;
-    }
-    time_s
 }

@@ -90,6 +90,16 @@ impl SpeedLoop {
         TorqueCommand { torque_n_m, current_a, clamped }
     }
 
+    /// What the box remembers from cycle to cycle.
+    pub(super) fn memory<'a>(&'a mut self, list: &mut Vec<&'a mut f64>) {
+        list.push(&mut self.integral_n_m);
+        self.speed_filter.memory(list);
+        if let Some(model) = &mut self.reference_model {
+            model.memory(list);
+        }
+        self.current_filter.memory(list);
+    }
+
     /// The integral is a number.
     pub(super) fn is_finite(&self) -> bool {
         self.integral_n_m.is_finite()
