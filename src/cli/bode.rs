@@ -148,16 +148,19 @@ fn rows(all: &[AxisResponses]) -> Vec<Vec<String>> {
                 or_none(of_loop.phase_margin.map(|m| format!("{:.1}°", m.margin_deg))),
                 or_none(gain),
                 or_none(of_loop.bandwidth_hz.map(hertz)),
-                format!(
-                    "{:.2} dB at {}",
-                    units::db_from_ratio(of_loop.peak.response.norm()),
-                    hertz(of_loop.peak.frequency_hz)
-                ),
+                peak(of_loop),
                 if of_loop.spectral_radius_ratio < 1.0 { "yes" } else { "NO" }.to_owned(),
             ]);
         }
     }
     rows
+}
+
+/// A peak above 0 dB, in words.
+pub(super) fn peak(of_loop: &LoopResponse) -> String {
+    let peak_db = units::db_from_ratio(of_loop.peak.response.norm());
+    // What a person would read as 0.00 dB is none.
+    if peak_db < 0.005 { "none".to_owned() } else { format!("{peak_db:.2} dB at {}", hertz(of_loop.peak.frequency_hz)) }
 }
 
 fn hertz(frequency_hz: f64) -> String {

@@ -2,7 +2,7 @@
 //!
 //! In: responses. Out: one HTML document, drawings inside it, light or dark as the reader's system is. Loads nothing, runs no script.
 
-use super::bode::{AxisResponses, LEFT_OUT, round, unwrapped_deg};
+use super::bode::{AxisResponses, LEFT_OUT, peak, round, unwrapped_deg};
 use crate::base::units::{US_PER_S, db_from_ratio};
 use crate::drive::{LoopResponse, Point};
 
@@ -58,7 +58,7 @@ pub(super) fn page(machine: &str, axes: &[AxisResponses]) -> String {
 }
 
 fn loop_section(name: &str, of_loop: &LoopResponse) -> String {
-    let mut text = format!("<h3>Loop of the {name}, cycle {} µs</h3>\n<table>", round(of_loop.period_s * US_PER_S));
+    let mut text = format!("<h3>{} loop, cycle {} µs</h3>\n<table>", capital(name), round(of_loop.period_s * US_PER_S));
     let mut row = |what: &str, value: String| text += &format!("<tr><th>{what}</th><td>{value}</td></tr>");
     match &of_loop.phase_margin {
         Some(margin) => {
@@ -74,14 +74,19 @@ fn loop_section(name: &str, of_loop: &LoopResponse) -> String {
         None => row("gain margin", "none".to_owned()),
     }
     row("-3 dB", of_loop.bandwidth_hz.map_or("none".to_owned(), |hz| format!("{} Hz", round(hz))));
-    let peak_db = db_from_ratio(of_loop.peak.response.norm());
-    row("peak", format!("{peak_db:.2} dB at {} Hz", round(of_loop.peak.frequency_hz)));
+    row("peak", peak(of_loop));
     row("stable", if of_loop.spectral_radius_ratio < 1.0 { "yes" } else { "no" }.to_owned());
     text += "</table>\n";
     text + &drawings(&[
         Curve { class: "a", name: "open loop", points: &of_loop.open },
         Curve { class: "b", name: "closed loop", points: &of_loop.closed },
     ])
+}
+
+/// The name of a loop as a heading has it.
+fn capital(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()
 }
 
 /// Key, amplitude and phase.

@@ -14,7 +14,7 @@ use super::plant::{Plant, PlantState};
 use super::position_loop::{PositionLoop, SpeedCommand};
 use super::reversal::{Correction, Reversal};
 use super::second_mass::{TwoMass, TwoMassState};
-use super::speed_loop::{SpeedLoop, TorqueCommand};
+use super::speed_loop::{SpeedLaw, SpeedLoop, TorqueCommand};
 use super::wire::{AxisSignals, Start, flags};
 use crate::base::TimeBase;
 use crate::machine::{Axis, PositionSource};
@@ -74,12 +74,31 @@ struct SecondMass {
 
 /// Wires around the position loop.
 #[derive(Clone, Copy)]
-struct Position {
+pub(super) struct Position {
     /// x_ref.
     reference_lu: f64,
     /// x_meas.
     measured_lu: f64,
-    command: SpeedCommand,
+    pub(super) command: SpeedCommand,
+}
+
+/// What holds in a position cycle of a plain axis.
+#[derive(Clone, Copy)]
+pub(super) struct Prepared {
+    input: DriveInput,
+    pub(super) terms: Terms,
+    pub(super) position: Position,
+    /// Gravity and outside load.
+    pub(super) gravity_n_m: f64,
+}
+
+/// The inner boxes of an axis whose speed loop, current loop and plant are all there is between two position cycles.
+pub(super) struct PlainParts {
+    pub(super) speed_ticks: u32,
+    pub(super) current_ticks: u32,
+    pub(super) speed_law: SpeedLaw,
+    pub(super) current_loop: CurrentLoop,
+    pub(super) plant: Plant,
 }
 
 /// All wires at one tick, by the box that drives them.
@@ -192,6 +211,52 @@ impl AxisDrive {
         }
         self.reference_before_lu = terms.reference_lu;
         self.current_mean_a = current_sum_a / f64::from(tick);
+    }
+
+    /// The inner boxes; `None`: the axis has something besides, and goes alone (see `batch`).
+    pub(super) fn plain_parts(&self) -> Option<PlainParts> {
+        let plain = self.speed_loop.is_plain()
+            && self.motor_encoder.is_ideal()
+            && !self.stiffness_control
+            && !self.plant.gravity_turns
+            && self.second_mass.is_none()
+            && self.pitch_error.is_none()
+            && self.backlash.is_none();
+        plain.then_some(PlainParts {
+            speed_ticks: self.speed_ticks,
+            current_ticks: self.current_ticks,
+            speed_law: self.speed_loop.law,
+            current_loop: self.current_loop,
+            plant: self.plant,
+        })
+    }
+
+    /// What stands before the speed loop, for a plain axis: the same as in `cycle`.
+    pub(super) fn prepare(&mut self, input: DriveInput) -> Prepared {
+        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
+        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
+        let correction = self.reversal.step(terms.set_velocity_lu_s);
+        let position = self.position_control(terms.reference_lu, &terms, &correction);
+        let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
+        Prepared { input, terms, position, gravity_n_m }
+    }
+
+    /// The signals at the first tick of a plain axis.
+    pub(super) fn signals_of(&self, ready: &Prepared, torque: TorqueCommand, voltage: VoltageCommand) -> AxisSignals {
+        let Prepared { input, terms, position, gravity_n_m } = *ready;
+        self.signals(&Wires { input, terms, position, torque, gravity_n_m, voltage })
+    }
+
+    /// State, Iv, Ii.
+    pub(super) fn memories(&self) -> (PlantState, f64, f64) {
+        (self.state, self.speed_loop.law.integral_n_m, self.current_loop.integral_v)
+    }
+
+    /// The end of a position cycle whose ticks ran in a batch.
+    pub(super) fn finish(&mut self, ready: &Prepared, memories: (PlantState, f64, f64), current_sum_a: f64) {
+        (self.state, self.speed_loop.law.integral_n_m, self.current_loop.integral_v) = memories;
+        self.reference_before_lu = ready.terms.reference_lu;
+        self.current_mean_a = current_sum_a / f64::from(self.ticks_per_step());
     }
 
     /// Encoder, position loop and what is added to its output.

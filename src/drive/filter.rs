@@ -96,6 +96,11 @@ impl Chain {
         self.0.iter_mut().fold(sample, |sample, section| section.step(sample))
     }
 
+    /// A wire.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// What its sections remember from cycle to cycle.
     pub(super) fn memory<'a>(&'a mut self, list: &mut Vec<&'a mut f64>) {
         self.0.iter_mut().for_each(|section| section.memory(list));

@@ -131,13 +131,10 @@ pub fn frequency_responses(data: &DriveData, time_base: &TimeBase, lowest_hz: f6
     };
     let whole = |h: &DMatrix<Complex<f64>>, row: usize, z: Complex<f64>| {
         let [reference, v_ff, t_ff] = preparation.at(z.inv());
-        (reference * (h[(row, 0)] + h[(row, 1)] / z) + v_ff * h[(row, 2)] + t_ff * h[(row, 3)], reference)
+        reference * (h[(row, 0)] + h[(row, 1)] / z) + v_ff * h[(row, 2)] + t_ff * h[(row, 3)]
     };
-    let setpoint = at(&|h, z| whole(h, 0, z).0);
-    let deviation = at(&|h, z| {
-        let (measured, reference) = whole(h, 1, z);
-        reference - measured
-    });
+    let setpoint = at(&|h, z| whole(h, 0, z));
+    let deviation = at(&|h, z| whole(h, 2, z));
     let compliance = at(&|h, _| h[(0, POSITION_INPUTS - 1)]);
     FrequencyResponses { current, speed, position, setpoint, deviation, compliance }
 }

@@ -194,26 +194,29 @@ impl LinearModel {
         })
     }
 
-    /// From x_ref, x_ref of the cycle before, v_ff, t_ff and outside torque to x and x_meas, at T_p.
+    /// From x_ref, x_ref of the cycle before, v_ff, t_ff and outside torque to x, x_meas and e_fol, at T_p.
     pub(super) fn position_closed(&self) -> StateSpace {
         self.probe(Level::Position, POSITION_INPUTS, |boxes, inputs| {
             let &[reference_lu, before_lu, v_ff_lu_s, t_ff_n_m, load_n_m] = inputs else { return Vec::new() };
             let measured_lu = self.measured_lu(boxes);
             let load_lu = self.transmission_lu_per_rad * boxes.load_angle_rad();
+            let reference_lu_at = |tick: u32| {
+                let left_ratio = f64::from(self.speed_ticks - 1 - tick) / f64::from(self.speed_ticks);
+                reference_lu + if self.stiffness_control { left_ratio * (before_lu - reference_lu) } else { 0.0 }
+            };
             let command = |reference_lu: f64, measured_lu: f64| {
                 (self.gain_per_s * (reference_lu - measured_lu) + v_ff_lu_s) / self.transmission_lu_per_rad
             };
-            let mut w_ref_rad_s = command(reference_lu, measured_lu);
+            let deviation_lu = reference_lu_at(0) - measured_lu;
+            let mut w_ref_rad_s = command(reference_lu_at(0), measured_lu);
             for tick in 0..self.speed_ticks {
                 if self.stiffness_control {
-                    let left_ratio = f64::from(self.speed_ticks - 1 - tick) / f64::from(self.speed_ticks);
-                    let now_lu = reference_lu + left_ratio * (before_lu - reference_lu);
-                    w_ref_rad_s = command(now_lu, self.measured_lu(boxes));
+                    w_ref_rad_s = command(reference_lu_at(tick), self.measured_lu(boxes));
                 }
                 let speed_rad_s = boxes.motor().speed_rad_s;
                 self.speed_cycle(boxes, w_ref_rad_s, speed_rad_s, t_ff_n_m, load_n_m);
             }
-            vec![load_lu, measured_lu]
+            vec![load_lu, measured_lu, deviation_lu]
         })
     }
 

@@ -9,10 +9,12 @@
 //! ```
 //!
 //! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal`,
-//! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike. `docs/drive.md` has
+//! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `batch` steps
+//! many drives at once. `docs/drive.md` has
 //! picture, law and code side by side.
 
 mod axis_drive;
+mod batch;
 mod backlash;
 mod choice;
 mod current_loop;
@@ -36,6 +38,7 @@ mod transition;
 mod wire;
 
 pub use axis_drive::{AxisDrive, DriveInput};
+pub use batch::DriveBatch;
 pub use choice::Drive;
 pub use frequency::{FrequencyResponses, GainMargin, LOWEST_HZ, LoopResponse, PhaseMargin, Point, frequency_responses};
 pub use ideal::IdealDrive;

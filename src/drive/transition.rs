@@ -18,15 +18,15 @@ use crate::machine::{MechanicsData, MotorData};
 /// Constant map over `duration_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Transition {
-    duration_s: f64,
+    pub(super) duration_s: f64,
     /// F(h) with the columns divided by L and J.
-    current_by_voltage_a_per_v: f64,
-    current_by_torque_a_per_n_m: f64,
-    speed_by_voltage_rad_s_per_v: f64,
-    speed_by_torque_rad_s_per_n_m: f64,
+    pub(super) current_by_voltage_a_per_v: f64,
+    pub(super) current_by_torque_a_per_n_m: f64,
+    pub(super) speed_by_voltage_rad_s_per_v: f64,
+    pub(super) speed_by_torque_rad_s_per_n_m: f64,
     /// G(h) with the columns divided by L and J.
-    angle_by_voltage_rad_per_v: f64,
-    angle_by_torque_rad_per_n_m: f64,
+    pub(super) angle_by_voltage_rad_per_v: f64,
+    pub(super) angle_by_torque_rad_per_n_m: f64,
 }
 
 /// What drives the state at one instant.

@@ -1,5 +1,6 @@
 //! The drive room from outside: closed forms of models/drive.md section 7, edge cases of section 8, an independent reference.
 
+mod batch;
 mod bode;
 mod closed_forms;
 mod friction;

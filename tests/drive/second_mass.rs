@@ -130,11 +130,11 @@ fn momentum_and_energy_balances() {
         let stuck = two_mass(&rig.clone().friction(0.0, 1e9));
         let (start, mut balances) = (TwoMassState { current_a: 0.4, ..AT_REST }, Balances::default());
         let mut state = start;
-        let (breakaways, mut stops) = (balances.stuck_pieces, 0);
+        let mut stops = 0;
         for tick in 0..6000 {
             let t_s = f64::from(tick) * h;
             let amplitude_v = 2.0 * data.motor.resistance_ohm / data.motor.torque_constant_n_m_per_a;
-            let u = amplitude_v * (TAU * 6.0 * t_s).sin() + if tick % 1000 > 900 { amplitude_v } else { 0.0 };
+            let u = amplitude_v * (TAU * 14.0 * t_s).sin() + if tick % 1000 > 900 { amplitude_v } else { 0.0 };
             let before = state;
             let mut in_tick = 0;
             let end = plant.pieces(state, u, 0.2, h, |piece| {
@@ -163,7 +163,7 @@ fn momentum_and_energy_balances() {
             let (error, size) = ((balances.sums[n] - (last[n] - first[n])).abs(), balances.sizes[n]);
             assert!(error < 1e-12 * size, "{name}: balance {n} is off by {error:e} of {size:e}");
         }
-        assert!(balances.stuck_pieces > 200 && stops > 5, "{name}: {breakaways}, {} {stops}", balances.stuck_pieces);
+        assert!(balances.stuck_pieces > 200 && stops > 2, "{name}: {} at rest, {stops} stops", balances.stuck_pieces);
     }
 }
 
@@ -180,15 +180,16 @@ fn a_tick_may_be_cut_anywhere() {
         let breakaway_rad = mechanics.breakaway_friction_n_m / mechanics.coupling_stiffness_n_m_per_rad;
         let state = TwoMassState {
             current_a: 2.0 * random.signed(),
-            motor_speed_rad_s: 0.05 * random.signed(),
-            twist_rad: breakaway_rad * (random.signed().signum() + 0.05 * random.signed()),
-            load_speed_rad_s: if round % 5 == 0 { 0.0 } else { 0.003 * random.signed() },
+            motor_speed_rad_s: 0.5 * random.signed(),
+            twist_rad: breakaway_rad * (random.signed().signum() + 0.02 * random.signed()),
+            load_speed_rad_s: if round % 5 == 0 { 0.0 } else { 3e-4 * random.signed() },
             load_angle_rad: random.signed(),
         };
         let (u, tg) = (20.0 * random.signed(), 0.02 * random.signed());
-        let mut pieces = 0;
-        let whole = plant.pieces(state, u, tg, h, |_| pieces += 1);
-        with_events += usize::from(pieces > 3);
+        let mut laws = Vec::new();
+        let whole = plant.pieces(state, u, tg, h, |piece| laws.push(piece.dry_friction_n_m));
+        laws.dedup();
+        with_events += usize::from(laws.len() > 1);
         let cut_s = h * (0.5 + 0.5 * random.signed());
         let parts = plant.pieces(plant.pieces(state, u, tg, cut_s, |_| {}), u, tg, h - cut_s, |_| {});
         for (what, a, b, tolerance) in [
