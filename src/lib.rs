@@ -100,4 +100,5 @@ pub mod interpolator;
 pub mod drive;
 pub mod recorder;
 pub mod kernel;
+pub mod trace;
 pub mod cli;

@@ -1,0 +1,204 @@
+//! Our own recordings as traces.
+//!
+//! In: a [`Recording`]. Out: a [`Trace`] with one signal a recorded field, events, programs, machine file, metadata and figures.
+//! Tool poses stay in the recording. Memory: 8 bytes a value; `only` keeps what is asked for.
+
+use super::import::ImportOptions;
+use super::wire::{Clock, Meaning, Origin, Signal, TimeGrid, Trace, TraceEvent, TraceFormat};
+use crate::base::units::NS_PER_S;
+use crate::base::{AxisKind, Diagnostic};
+use crate::recorder::schema::proto::sollwert::Path as PathMessage;
+use crate::recorder::{
+    ABOUT_METADATA, AXIS_FIELDS, AxisSample, Content, Message, PATH_FIELDS, Recording, TopicKind, UNITS_METADATA,
+};
+use std::collections::BTreeMap;
+
+/// Times of a recording are whole nanoseconds.
+const TIME_TOLERANCE_S: f64 = 1e-9;
+
+/// Reads the wanted signals of a recording.
+pub fn import_recording(recording: &Recording, options: &ImportOptions) -> Result<Trace, Diagnostic> {
+    let mut tracks: Vec<Option<Track>> =
+        recording.topics().iter().map(|topic| Track::new(&topic.kind, &topic.fields, options)).collect();
+    let mut events = Vec::new();
+    for message in recording.messages()? {
+        let Message { topic, time_ns, content, .. } = message?;
+        let track = tracks.get_mut(topic).and_then(Option::as_mut);
+        match (content, track) {
+            (Content::Axis(sample), Some(track)) => track.push_axis(time_ns, &sample),
+            (Content::Path(path), Some(track)) => track.push_path(time_ns, &path),
+            (Content::Event(event), _) => events.push(TraceEvent { time_s: time_ns as f64 / NS_PER_S, event: *event }),
+            _ => {}
+        }
+    }
+    let about = recording.metadata(ABOUT_METADATA);
+    let version = about.and_then(|about| about.get("version")).map_or("", String::as_str);
+    Ok(Trace {
+        name: recording.path().display().to_string(),
+        origin: Origin {
+            format: TraceFormat::Recording,
+            description: format!("{} {version}", TraceFormat::Recording.title()).trim_end().to_owned(),
+            start_utc: None,
+        },
+        signals: tracks.into_iter().flatten().flat_map(Track::finish).collect(),
+        events,
+        programs: recording.programs()?,
+        machine: recording.machine_text()?,
+        metadata: metadata(recording),
+        summary: recording.summary(),
+        notes: Vec::new(),
+    })
+}
+
+fn metadata(recording: &Recording) -> BTreeMap<String, BTreeMap<String, String>> {
+    let names = recording.metadata_names().filter(|name| *name != UNITS_METADATA);
+    names.filter_map(|name| Some((name.to_owned(), recording.metadata(name)?.clone()))).collect()
+}
+
+/// Wanted fields of one topic.
+struct Track {
+    clock: Clock,
+    times_ns: Vec<u64>,
+    columns: Vec<Column>,
+}
+
+/// One signal in the making.
+struct Column {
+    /// Place in `AXIS_FIELDS` or `PATH_FIELDS`.
+    field: usize,
+    name: String,
+    unit: String,
+    values: Vec<f64>,
+    labels: Labels,
+    discrete: bool,
+}
+
+/// Words by number, in the order of their first appearance.
+#[derive(Default)]
+struct Labels {
+    words: Vec<String>,
+    places: BTreeMap<String, usize>,
+}
+
+impl Labels {
+    fn place(&mut self, word: &str) -> usize {
+        if let Some(place) = self.places.get(word) {
+            return *place;
+        }
+        self.words.push(word.to_owned());
+        self.places.insert(word.to_owned(), self.words.len() - 1);
+        self.words.len() - 1
+    }
+}
+
+impl Track {
+    fn new(kind: &TopicKind, fields: &[usize], options: &ImportOptions) -> Option<Self> {
+        let columns: Vec<Column> = match kind {
+            TopicKind::Axis { name, kind } => fields.iter().map(|field| Column::of_axis(name, *kind, *field)).collect(),
+            TopicKind::Path => (0..PATH_FIELDS.len()).map(Column::of_path).collect(),
+            _ => return None,
+        };
+        let clock = if *kind == TopicKind::Path { Clock::Interpolator } else { Clock::Servo };
+        let columns: Vec<Column> = columns.into_iter().filter(|column| options.wants(&column.name)).collect();
+        (!columns.is_empty()).then_some(Self { clock, times_ns: Vec::new(), columns })
+    }
+
+    /// False for a message that is not later than the one before: it cannot be placed.
+    fn push_time(&mut self, time_ns: u64) -> bool {
+        let later = self.times_ns.last().is_none_or(|last| time_ns > *last);
+        if later {
+            self.times_ns.push(time_ns);
+        }
+        later
+    }
+
+    fn push_axis(&mut self, time_ns: u64, sample: &AxisSample) {
+        if self.push_time(time_ns) {
+            for column in &mut self.columns {
+                column.values.push(sample.get(column.field).unwrap_or(f64::NAN));
+            }
+        }
+    }
+
+    fn push_path(&mut self, time_ns: u64, path: &PathMessage) {
+        if self.push_time(time_ns) {
+            for column in &mut self.columns {
+                column.push_path(path);
+            }
+        }
+    }
+
+    fn finish(self) -> Vec<Signal> {
+        let times_s: Vec<f64> = self.times_ns.iter().map(|time_ns| *time_ns as f64 / NS_PER_S).collect();
+        let times = TimeGrid::from_times(times_s, TIME_TOLERANCE_S);
+        let clock = self.clock;
+        self.columns.into_iter().map(|column| column.finish(clock, times.clone())).collect()
+    }
+}
+
+impl Column {
+    fn of_axis(axis: &str, kind: AxisKind, field: usize) -> Self {
+        let entry = &AXIS_FIELDS[field];
+        Self {
+            field,
+            name: format!("{axis}.{}", entry.name(kind)),
+            unit: entry.unit_name(kind).to_owned(),
+            values: Vec::new(),
+            labels: Labels::default(),
+            discrete: entry.stem == "flags",
+        }
+    }
+
+    fn of_path(field: usize) -> Self {
+        let name = PATH_FIELDS[field];
+        Self {
+            field,
+            name: format!("path.{name}"),
+            unit: path_unit(name).to_owned(),
+            values: Vec::new(),
+            labels: Labels::default(),
+            discrete: matches!(name, "block" | "line" | "buffered_blocks" | "rotary_only"),
+        }
+    }
+
+    fn push_path(&mut self, path: &PathMessage) {
+        let mut word = |text: &Option<String>| text.as_deref().map_or(f64::NAN, |text| self.labels.place(text) as f64);
+        // In the order of `PATH_FIELDS`.
+        let value = match self.field {
+            0 => word(&path.program),
+            1 => path.block.map_or(f64::NAN, |block| block as f64),
+            2 => path.line.map_or(f64::NAN, f64::from),
+            3 => path.s_mm.unwrap_or(f64::NAN),
+            4 => path.feed_mm_min.unwrap_or(f64::NAN),
+            5 => path.programmed_feed_mm_min.unwrap_or(f64::NAN),
+            6 => path.acceleration_mm_s2.unwrap_or(f64::NAN),
+            7 => path.jerk_mm_s3.unwrap_or(f64::NAN),
+            8 => word(&path.limit_axis),
+            9 => word(&path.limit_kind),
+            10 => path.buffered_blocks.map_or(f64::NAN, f64::from),
+            11 => path.contour_error_mm.unwrap_or(f64::NAN),
+            12 => path.rotary_only.map_or(f64::NAN, |only| f64::from(u8::from(only))),
+            _ => path.override_ratio.unwrap_or(f64::NAN),
+        };
+        self.values.push(value);
+    }
+
+    fn finish(self, clock: Clock, times: TimeGrid) -> Signal {
+        Signal {
+            original: self.name.clone(),
+            name: Some(self.name),
+            unit: self.unit,
+            clock,
+            times,
+            values: self.values,
+            labels: self.labels.words,
+            discrete: self.discrete,
+            meaning: Meaning::default(),
+        }
+    }
+}
+
+fn path_unit(field: &str) -> &'static str {
+    let units = [("_mm_min", "mm/min"), ("_mm_s2", "mm/s^2"), ("_mm_s3", "mm/s^3"), ("_mm", "mm")];
+    units.iter().find(|(ending, _)| field.ends_with(ending)).map_or("", |(_, unit)| unit)
+}
