@@ -287,9 +287,11 @@ impl AxisDrive {
                 self.state = second.state.motor();
             }
         }
-        let before_play_lu = self.before_play_lu();
-        if let Some(backlash) = &mut self.backlash {
-            backlash.follow(before_play_lu);
+        if self.backlash.is_some() {
+            let before_play_lu = self.before_play_lu();
+            if let Some(backlash) = &mut self.backlash {
+                backlash.follow(before_play_lu);
+            }
         }
     }
 

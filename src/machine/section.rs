@@ -370,7 +370,8 @@ impl<'f> Section<'f> {
     pub fn missing(&self, name: &str, help: &str) {
         let key = self.key(name);
         // A misspelt key, or that of the other kind of axis, has its own report.
-        if self.quiet || self.has(key.counterpart) || self.entries.iter().any(|entry| self.misspells(entry, name)) {
+        let elsewhere = self.has(key.counterpart) && self.known().all(|known| known != key.counterpart);
+        if self.quiet || elsewhere || self.entries.iter().any(|entry| self.misspells(entry, name)) {
             return;
         }
         let table = if self.path.is_empty() { "the machine file".to_owned() } else { format!("[{}]", self.path) };
