@@ -29,6 +29,9 @@ pub const LOWEST_HZ: f64 = 0.1;
 /// Bisections for a crossing: to the last bit.
 const BISECTIONS: u32 = 60;
 
+/// Row an output, column an input.
+type Responses = DMatrix<Complex<f64>>;
+
 /// A response at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
@@ -126,10 +129,10 @@ pub fn frequency_responses(data: &DriveData, time_base: &TimeBase, lowest_hz: f6
         },
     );
     let preparation = Preparation::new(data, position_period_s);
-    let at = |pick: &dyn Fn(&DMatrix<Complex<f64>>, Complex<f64>) -> Complex<f64>| {
+    let at = |pick: &dyn Fn(&Responses, Complex<f64>) -> Complex<f64>| {
         curve(lowest_hz, position_period_s, |z| pick(&response(&closed, z), z))
     };
-    let whole = |h: &DMatrix<Complex<f64>>, row: usize, z: Complex<f64>| {
+    let whole = |h: &Responses, row: usize, z: Complex<f64>| {
         let [reference, v_ff, t_ff] = preparation.at(z.inv());
         reference * (h[(row, 0)] + h[(row, 1)] / z) + v_ff * h[(row, 2)] + t_ff * h[(row, 3)]
     };
@@ -202,7 +205,7 @@ fn on_circle(frequency_hz: f64, period_s: f64) -> Complex<f64> {
 }
 
 /// C (z - A)⁻¹ B + D; NaN where z is a pole.
-fn response(system: &StateSpace, z: Complex<f64>) -> DMatrix<Complex<f64>> {
+fn response(system: &StateSpace, z: Complex<f64>) -> Responses {
     let complex = |matrix: &DMatrix<f64>| matrix.map(|value| Complex::new(value, 0.0));
     let order = system.a.nrows();
     let resolvent = DMatrix::from_diagonal_element(order, order, z) - complex(&system.a);

@@ -39,7 +39,7 @@ struct Boxes {
 #[derive(Clone, Debug)]
 enum Motion {
     Rigid(Plant, PlantState),
-    TwoMass(TwoMass, TwoMassState),
+    TwoMass(Box<TwoMass>, TwoMassState),
 }
 
 /// Which memories belong to a loop. Below the position loop nobody asks where the axis is.
@@ -118,7 +118,7 @@ impl LinearModel {
         let motion = match TwoMass::new(data, current_period_s) {
             Some(plant) => {
                 let state = plant.held(0.0, 0.0, true);
-                Motion::TwoMass(plant, state)
+                Motion::TwoMass(Box::new(plant), state)
             }
             None => {
                 let state = PlantState { current_a: 0.0, speed_rad_s: 0.0, angle_rad: 0.0 };

@@ -55,9 +55,9 @@ fn error(table: &ErrorTable, position_lu: f64) -> (f64, f64) {
     if table.periodic {
         place = place.rem_euclid(intervals as f64);
     }
-    // NaN and what lies before the table become 0; the last interval ends in the last point.
+    // What lies before the table takes its first interval; the last one ends in the last point. NaN stays NaN in the fraction.
     let before = (place.floor().max(0.0) as usize).min(intervals.saturating_sub(1));
-    let fraction_ratio = (place - before as f64).max(0.0).min(1.0);
+    let fraction_ratio = (place - before as f64).clamp(0.0, 1.0);
     let (Some(first_lu), Some(second_lu)) = (errors_lu.get(before), errors_lu.get(before + 1)) else {
         return (0.0, 0.0);
     };
