@@ -9,6 +9,7 @@ use super::current_loop::{CurrentLoop, VoltageCommand};
 use super::encoder::{MotorEncoder, PositionEncoder};
 use super::feedforward::{Feedforward, Terms};
 use super::jerk_filter::JerkFilter;
+use super::monitor::{Monitor, View};
 use super::pitch_error::PitchError;
 use super::plant::{Plant, PlantState};
 use super::position_loop::{PositionLoop, SpeedCommand};
@@ -49,6 +50,7 @@ pub struct AxisDrive {
     /// Boxed as the second mass is.
     pitch_error: Option<Box<PitchError>>,
     backlash: Option<Backlash>,
+    monitor: Monitor,
     /// MD31040 = 0: the position is that of the motor.
     motor_measures: bool,
     /// MD32640.
@@ -59,6 +61,8 @@ pub struct AxisDrive {
     transmission_lu_per_rad: f64,
     /// n_p = T_p / T_v.
     speed_ticks: u32,
+    /// T_p.
+    position_period_s: f64,
     /// n_v = T_v / T_i.
     current_ticks: u32,
     /// Mean of the current over the last position cycle.
@@ -82,12 +86,21 @@ pub(super) struct Position {
     pub(super) command: SpeedCommand,
 }
 
+/// What a position cycle begins with.
+struct Beginning {
+    terms: Terms,
+    correction: Correction,
+    position: Position,
+    view: View,
+}
+
 /// What holds in a position cycle of a plain axis.
 #[derive(Clone, Copy)]
 pub(super) struct Prepared {
     input: DriveInput,
     pub(super) terms: Terms,
     pub(super) position: Position,
+    view: View,
     /// Gravity and outside load.
     pub(super) gravity_n_m: f64,
 }
@@ -106,6 +119,7 @@ struct Wires {
     input: DriveInput,
     terms: Terms,
     position: Position,
+    view: View,
     torque: TorqueCommand,
     gravity_n_m: f64,
     voltage: VoltageCommand,
@@ -156,11 +170,13 @@ impl AxisDrive {
                 pitch_error.as_ref().map_or(position_lu, |error| error.load_lu(nominal_lu)),
             ),
             pitch_error,
+            monitor: Monitor::new(data, position_period_s, position_lu),
             motor_measures,
             stiffness_control: data.options.stiffness_control,
             reference_before_lu: position_lu,
             transmission_lu_per_rad,
             speed_ticks: whole_ratio(data.position_cycle_ticks, data.speed_cycle_ticks),
+            position_period_s,
             current_ticks: whole_ratio(data.speed_cycle_ticks, data.current_cycle_ticks),
             current_mean_a: current_a,
         })
@@ -185,16 +201,15 @@ impl AxisDrive {
     /// The diagram, from left to right.
     #[inline(always)]
     fn cycle(&mut self, input: DriveInput, mut observe: impl FnMut(u32, &Self, &Wires)) {
-        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
-        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
-        let correction = self.reversal.step(terms.set_velocity_lu_s);
-        let mut position = self.position_control(terms.reference_lu, &terms, &correction);
+        let Beginning { terms, correction, mut position, view } = self.begin(&input);
+        let speed_period_s = self.position_period_s / f64::from(self.speed_ticks);
 
         let mut tick = 0;
         let mut current_sum_a = 0.0;
         for speed_tick in 0..self.speed_ticks {
             if self.stiffness_control {
                 position = self.position_control(self.reference_lu(speed_tick, &terms), &terms, &correction);
+                self.monitor.advance(position.reference_lu, terms.velocity_lu_s, speed_period_s);
             }
             let measured_rad_s = self.motor_encoder.measured_speed_rad_s(self.state);
             let speed_rad_s = position.command.motor_speed_rad_s;
@@ -203,7 +218,7 @@ impl AxisDrive {
             for _ in 0..self.current_ticks {
                 let voltage = self.current_loop.step(torque.current_a - self.state.current_a);
                 let gravity_n_m = self.plant.gravity_n_m(self.load_angle_rad()) + input.load_n_m;
-                observe(tick, self, &Wires { input, terms, position, torque, gravity_n_m, voltage });
+                observe(tick, self, &Wires { input, terms, position, view, torque, gravity_n_m, voltage });
                 current_sum_a += self.state.current_a;
                 self.move_on(voltage.voltage_v, gravity_n_m);
                 tick += 1;
@@ -211,6 +226,20 @@ impl AxisDrive {
         }
         self.reference_before_lu = terms.reference_lu;
         self.current_mean_a = current_sum_a / f64::from(tick);
+    }
+
+    /// What stands before the speed loop: set-point preparation, position loop, monitoring.
+    #[inline(always)]
+    fn begin(&mut self, input: &DriveInput) -> Beginning {
+        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
+        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
+        let correction = self.reversal.step(terms.set_velocity_lu_s);
+        let position = self.position_control(terms.reference_lu, &terms, &correction);
+        let view = self.monitor.watch(input.position_setpoint_lu, position.measured_lu);
+        if !self.stiffness_control {
+            self.monitor.advance(position.reference_lu, terms.velocity_lu_s, self.position_period_s);
+        }
+        Beginning { terms, correction, position, view }
     }
 
     /// The inner boxes; `None`: the axis has something besides, and goes alone (see `batch`).
@@ -231,20 +260,17 @@ impl AxisDrive {
         })
     }
 
-    /// What stands before the speed loop, for a plain axis: the same as in `cycle`.
+    /// The beginning of a position cycle of a plain axis.
     pub(super) fn prepare(&mut self, input: DriveInput) -> Prepared {
-        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
-        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
-        let correction = self.reversal.step(terms.set_velocity_lu_s);
-        let position = self.position_control(terms.reference_lu, &terms, &correction);
+        let Beginning { terms, position, view, .. } = self.begin(&input);
         let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
-        Prepared { input, terms, position, gravity_n_m }
+        Prepared { input, terms, position, view, gravity_n_m }
     }
 
     /// The signals at the first tick of a plain axis.
     pub(super) fn signals_of(&self, ready: &Prepared, torque: TorqueCommand, voltage: VoltageCommand) -> AxisSignals {
-        let Prepared { input, terms, position, gravity_n_m } = *ready;
-        self.signals(&Wires { input, terms, position, torque, gravity_n_m, voltage })
+        let Prepared { input, terms, position, view, gravity_n_m } = *ready;
+        self.signals(&Wires { input, terms, position, view, torque, gravity_n_m, voltage })
     }
 
     /// State, Iv, Ii.
@@ -363,7 +389,7 @@ impl AxisDrive {
 
     /// The wires in the units of the load side.
     fn signals(&self, wires: &Wires) -> AxisSignals {
-        let Wires { input, terms, position, torque, gravity_n_m, voltage } = wires;
+        let Wires { input, terms, position, view, torque, gravity_n_m, voltage } = wires;
         let (speed, position_lu) = (&position.command, self.load_lu());
         let (sticks, friction_torque_n_m, load_speed_rad_s) = match &self.second_mass {
             None => {
@@ -407,6 +433,8 @@ impl AxisDrive {
             current_mean_a: self.current_mean_a,
             voltage_v: voltage.voltage_v,
             flags: bits,
+            contour_deviation_lu: view.contour_deviation_lu,
+            monitoring: view.bits,
         }
     }
 }

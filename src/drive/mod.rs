@@ -28,6 +28,7 @@ mod integral;
 mod jerk_filter;
 mod limit;
 mod linear_model;
+mod monitor;
 mod pitch_error;
 mod plant;
 mod position_loop;

@@ -6,6 +6,7 @@ mod closed_forms;
 mod friction;
 mod limits;
 mod linear;
+mod monitoring;
 mod options;
 mod plant;
 mod reference;
