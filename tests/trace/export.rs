@@ -65,9 +65,15 @@ fn a_recording_of_a_trace_is_the_trace() {
         let same = back.signals.iter().find(|other| other.original == signal.original).unwrap();
         assert_eq!(same, signal);
     }
-    // A table is made of it too, with one row an instant.
+    // A table is made of it too, with one row an instant and every signal by its original name.
     let table = exported(&output, ExportForm::Csv, "to_recording.csv");
+    let back = import(&table, &options()).unwrap();
     assert_eq!(std::fs::read_to_string(table).unwrap().lines().count(), 502);
+    for signal in &trace.signals {
+        let same = back.signals.iter().find(|other| other.original == signal.original).unwrap();
+        let values: Vec<f64> = same.resampled_on(&signal.times, sollwert::trace::Method::Hold);
+        assert_eq!(values, signal.values, "{}", signal.original);
+    }
     // The same bytes each time.
     let again = exported(&input, ExportForm::Recording, "to_recording2.mcap");
     assert_eq!(std::fs::read(output).unwrap(), std::fs::read(again).unwrap());
