@@ -9,7 +9,6 @@
 //! cargo test --test proof                                              300 programs for each time law
 //! PROOF_PROGRAMS=100000 cargo test --release --test proof              the nightly run
 //! PROOF_FIRST=4711 PROOF_PROGRAMS=1 cargo test --test proof            one seed again
-//! cargo test --test proof -- --ignored                                 the faults that are known, with the programs that show them
 //! ```
 
 mod axes;
@@ -155,15 +154,10 @@ impl Proof<'_> {
     }
 }
 
-fn unknown(mut findings: Vec<Finding>, known: fn(&Finding) -> bool) -> Vec<Finding> {
-    findings.retain(|finding| !known(finding));
-    findings
-}
-
-fn prove(law: Law, known: fn(&Finding) -> bool) {
+fn prove(law: Law) {
     let judged = |seed| {
         let (settings, program, random) = case(seed, law);
-        unknown(judged(&settings, &program, Some(random)), known)
+        judged(&settings, &program, Some(random))
     };
     let print = |seed, kind| {
         let (settings, program, random) = case(seed, law);
@@ -183,11 +177,11 @@ fn failing(settings: &Settings, program: &Program, kind: Kind, random: &Random) 
 }
 
 /// A tenth as many: a turned path takes the long way through the planner.
-fn prove_transformed(law: Law, known: fn(&Finding) -> bool) {
+fn prove_transformed(law: Law) {
     assert!(transformed::bends(law));
     let judged = |seed| {
         let (settings, program) = transformed::case(seed, law);
-        unknown(transformed::judged(&settings, &program), known)
+        transformed::judged(&settings, &program)
     };
     let print = |seed, kind: Kind| {
         let (settings, program) = transformed::case(seed, law);
@@ -201,30 +195,33 @@ fn prove_transformed(law: Law, known: fn(&Finding) -> bool) {
 
 #[test]
 fn seven_phase() {
-    prove(Law::SevenPhase, |_| false);
+    prove(Law::SevenPhase);
 }
 
 #[test]
 fn seven_phase_transformed() {
-    prove_transformed(Law::SevenPhase, |_| false);
+    prove_transformed(Law::SevenPhase);
 }
 
-/// Every limit holds. Of 300 programs a few take another time reversed, or with a block in two, by a little more than they should: that
-/// fault is known, and the strict test below fails on it.
+/// Every limit holds. Reversed, or with a block in two, about one program in a thousand takes another time by more than it should: none of the
+/// 300, but some of the nightly run.
 #[test]
 fn continuous() {
-    prove(Law::Continuous, known);
+    prove(Law::Continuous);
 }
 
 /// Seeds whose set-points broke a limit once: BRISK with a curve that bends within micrometres, a feed at the start of a plan, a plan that began
-/// in the middle of an interval.
-const BROKE_ONCE: [u64; 8] = [3632, 6477, 5355, 6252, 10823, 11939, 12164, 15105];
+/// in the middle of an interval, a jerk between the places of a spline, DRIVE on a rotary axis, an axis thought to be idle, a start on a cusp.
+const BROKE_ONCE: [u64; 13] = [3632, 6477, 5355, 6252, 10823, 11939, 12164, 15105, 10576, 12289, 20241, 23951, 27598];
+
+/// And those that took longer one way than the other, or stopped where no plan was found.
+const SLOW_ONCE: [u64; 5] = [10410, 11197, 11349, 11524, 13347];
 
 #[test]
-fn programs_that_broke_a_limit_once() {
-    for seed in BROKE_ONCE {
+fn programs_that_were_wrong_once() {
+    for seed in BROKE_ONCE.into_iter().chain(SLOW_ONCE) {
         let (settings, program, random) = case(seed, Law::Continuous);
-        let left = unknown(judged(&settings, &program, Some(random)), known);
+        let left = judged(&settings, &program, Some(random));
         assert!(
             left.is_empty(),
             "seed {seed}: {} findings, such as PROOF_FIRST={seed} PROOF_PROGRAMS=1 shows",
@@ -235,22 +232,7 @@ fn programs_that_broke_a_limit_once() {
 
 #[test]
 fn continuous_transformed() {
-    prove_transformed(Law::Continuous, |_| false);
-}
-
-#[test]
-#[ignore = "finds the faults that are known"]
-fn continuous_strict() {
-    prove(Law::Continuous, |_| false);
-}
-
-/// How far a finding under `continuous` may go before it is a new one: 2 % of the time reversed where 0.5 % is meant, 0.1 % split.
-fn known(finding: &Finding) -> bool {
-    match finding.kind {
-        Kind::Reversed => finding.ratio < 4.0,
-        Kind::Split => finding.ratio < 5.0,
-        _ => false,
-    }
+    prove_transformed(Law::Continuous);
 }
 
 /// `continuous` within 5 % of the optimum: in the nightly run on 100 paths, in the ordinary one on few, because the optimum takes its time.
