@@ -32,4 +32,5 @@ pub use setup::{
     ABOUT_METADATA, AXES_METADATA, CYCLE_METADATA, Compression, INPUTS_METADATA, MACHINE_MEDIA_TYPE,
     PROGRAM_MEDIA_TYPE, RecordingSetup, SUMMARY_METADATA, UNITS_METADATA,
 };
+pub(crate) use target::WholeFile;
 pub use writer::RecordingSummary;
