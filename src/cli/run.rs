@@ -9,9 +9,10 @@ use super::report::write_of_recording;
 use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome, RunSummary};
 use crate::machine::Loaded;
-use crate::recorder::SignalChoice;
+use crate::recorder::{RecordRate, SignalChoice};
 use clap::Args;
 use serde_json::json;
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 #[derive(Args)]
@@ -37,12 +38,18 @@ pub(super) struct RunArguments {
     /// Simulated seconds per second of real time, 1 = real time; default: as fast as possible
     #[arg(long, value_name = "X", value_parser = positive)]
     pace: Option<f64>,
-    /// Signals to record, such as X.current_a,Y.*,path.*; default: all
+    /// Signals to record, such as X.current_a,Y.*/10 (every tenth sample),path.*; default: all
     #[arg(long, value_name = "SIGNALS")]
     record: Option<String>,
-    /// Rate of the axis signals; speed and current are not built yet
-    #[arg(long, value_name = "RATE", default_value = "position", value_parser = ["position"])]
+    /// Rate of the axis signals: the cycle of the position, speed or current controller
+    #[arg(long, value_name = "RATE", default_value = "position", value_parser = RecordRate::WORDS)]
     record_rate: String,
+    /// Record every N-th sample of axes and path only
+    #[arg(long, value_name = "N", default_value = "1")]
+    record_decimate: NonZeroU32,
+    /// Go on behind the last set-point until every axis is in position; the set-point stands, and figures do not count it
+    #[arg(long)]
+    record_to_rest: bool,
     /// Mantissa bits to keep in recorded values, 1 to 52: 36 keep 7e-9 mm and save a fifth of the size
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=52))]
     record_precision: Option<u8>,
@@ -68,7 +75,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let inputs = [arguments.program.as_path()].into_iter().chain(arguments.machine.path());
     refuse_same_file(inputs.chain(arguments.surroundings.workshop_files()), &recording)?;
     check_page(arguments, &recording)?;
-    let mut signals = parse_signals(arguments.record.as_deref(), &machine)?;
+    let rate = RecordRate::from_word(&arguments.record_rate).unwrap_or_default();
+    let signals = parse_signals(arguments.record.as_deref(), &machine)?;
+    let mut signals = signals.at_rate(rate).decimated(arguments.record_decimate).until_rest(arguments.record_to_rest);
     if arguments.no_drives {
         // Without drives every wire behind the set-point is a copy of it: only what was computed is recorded.
         signals = signals.and(&SignalChoice::setpoints());

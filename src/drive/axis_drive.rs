@@ -9,6 +9,7 @@ use super::current_loop::{CurrentLoop, VoltageCommand};
 use super::encoder::{MotorEncoder, PositionEncoder};
 use super::feedforward::{Feedforward, Terms};
 use super::jerk_filter::JerkFilter;
+use super::monitor::{Monitor, View};
 use super::plant::{Plant, PlantState};
 use super::position_loop::{PositionLoop, SpeedCommand};
 use super::reversal::{Correction, Reversal};
@@ -42,6 +43,7 @@ pub struct AxisDrive {
     plant: Plant,
     state: PlantState,
     backlash: Option<Backlash>,
+    monitor: Monitor,
     /// MD31040 = 0: the position is that of the motor.
     motor_measures: bool,
     /// MD32640.
@@ -52,6 +54,8 @@ pub struct AxisDrive {
     transmission_lu_per_rad: f64,
     /// n_p = T_p / T_v.
     speed_ticks: u32,
+    /// T_p.
+    position_period_s: f64,
     /// n_v = T_v / T_i.
     current_ticks: u32,
     /// Mean of the current over the last position cycle.
@@ -73,6 +77,7 @@ struct Wires {
     input: DriveInput,
     terms: Terms,
     position: Position,
+    view: View,
     torque: TorqueCommand,
     gravity_n_m: f64,
     voltage: VoltageCommand,
@@ -105,12 +110,14 @@ impl AxisDrive {
             current_loop: CurrentLoop::new(data, current_period_s, data.motor.resistance_ohm * current_a),
             plant,
             state: PlantState { current_a, speed_rad_s: 0.0, angle_rad },
+            monitor: Monitor::new(data, position_period_s, position_lu),
             backlash: Backlash::new(data.mechanics.backlash_lu, position_lu),
             motor_measures: data.encoder.position_source == PositionSource::Motor,
             stiffness_control: data.options.stiffness_control,
             reference_before_lu: position_lu,
             transmission_lu_per_rad,
             speed_ticks: whole_ratio(data.position_cycle_ticks, data.speed_cycle_ticks),
+            position_period_s,
             current_ticks: whole_ratio(data.speed_cycle_ticks, data.current_cycle_ticks),
             current_mean_a: current_a,
         })
@@ -140,11 +147,19 @@ impl AxisDrive {
         let correction = self.reversal.step(terms.set_velocity_lu_s);
         let mut position = self.position_control(terms.reference_lu, &terms, &correction);
 
+        let view = self.monitor.watch(input.position_setpoint_lu, position.measured_lu);
+
+        let speed_period_s = self.position_period_s / f64::from(self.speed_ticks);
+        if !self.stiffness_control {
+            self.monitor.advance(position.reference_lu, terms.velocity_lu_s, self.position_period_s);
+        }
+
         let mut tick = 0;
         let mut current_sum_a = 0.0;
         for speed_tick in 0..self.speed_ticks {
             if self.stiffness_control {
                 position = self.position_control(self.reference_lu(speed_tick, &terms), &terms, &correction);
+                self.monitor.advance(position.reference_lu, terms.velocity_lu_s, speed_period_s);
             }
             let measured_rad_s = self.motor_encoder.measured_speed_rad_s(self.state);
             let speed_rad_s = position.command.motor_speed_rad_s;
@@ -153,7 +168,7 @@ impl AxisDrive {
             for _ in 0..self.current_ticks {
                 let voltage = self.current_loop.step(torque.current_a - self.state.current_a);
                 let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
-                observe(tick, self, &Wires { input, terms, position, torque, gravity_n_m, voltage });
+                observe(tick, self, &Wires { input, terms, position, view, torque, gravity_n_m, voltage });
                 current_sum_a += self.state.current_a;
                 self.state = self.plant.step(self.state, voltage.voltage_v, gravity_n_m);
                 if let Some(backlash) = &mut self.backlash {
@@ -224,7 +239,7 @@ impl AxisDrive {
 
     /// The wires in the units of the load side.
     fn signals(&self, wires: &Wires) -> AxisSignals {
-        let Wires { input, terms, position, torque, gravity_n_m, voltage } = wires;
+        let Wires { input, terms, position, view, torque, gravity_n_m, voltage } = wires;
         let (speed, position_lu) = (&position.command, self.load_lu());
         let mut bits = 0;
         for (set, flag) in [
@@ -256,6 +271,8 @@ impl AxisDrive {
             current_mean_a: self.current_mean_a,
             voltage_v: voltage.voltage_v,
             flags: bits,
+            contour_deviation_lu: view.contour_deviation_lu,
+            monitoring: view.bits,
         }
     }
 }

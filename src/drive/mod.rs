@@ -23,6 +23,7 @@ mod filter;
 mod ideal;
 mod jerk_filter;
 mod limit;
+mod monitor;
 mod plant;
 mod position_loop;
 mod reversal;

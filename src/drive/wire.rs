@@ -44,6 +44,24 @@ pub struct AxisSignals {
     pub voltage_v: f64,
     /// Bits of [`flags`].
     pub flags: u32,
+    /// Contour deviation: lag of the axis minus the lag that the control's model of it has (CONT_DEV, trackErrDiff).
+    pub contour_deviation_lu: f64,
+    /// Bits of [`monitoring`].
+    pub monitoring: u32,
+}
+
+/// Bits of [`AxisSignals::monitoring`]: what the control sees at the position tick.
+pub mod monitoring {
+    /// The set-point rests and the axis is in the coarse window (MD36000).
+    pub const IN_POSITION_COARSE: u32 = 1;
+    /// The set-point rests and the axis is in the fine window (MD36010).
+    pub const IN_POSITION_FINE: u32 = 2;
+    /// The contour deviation is larger than MD36400.
+    pub const CONTOUR: u32 = 4;
+    /// The axis has not come into the fine window within MD36020.
+    pub const POSITIONING: u32 = 8;
+    /// MD36040 after the end of a motion the axis is away by more than MD36030.
+    pub const STANDSTILL: u32 = 16;
 }
 
 /// Bits of [`AxisSignals::flags`].

@@ -49,6 +49,11 @@ impl Overlay {
         self.busy = true;
     }
 
+    /// True for an axis that is under way.
+    pub(super) fn under_way(&self) -> PerAxis<bool> {
+        PerAxis::from_fn(|axis| self.ways[axis].now.is_some())
+    }
+
     /// Adds the ways to the set-points of cycle `k`.
     pub(super) fn add(&mut self, k: u64, axes: &mut PerAxis<AxisSetpoint>) {
         if !self.busy {

@@ -5,10 +5,14 @@
 //! Time inside a piece is what the cycle before left over when the piece began, plus whole cycles counted from there: no block is
 //! rounded to ticks and t_s is never summed up. Positions come from the curve, not from integration. Row 0 is the start posture;
 //! the last row is the end posture at rest, on the first tick at or after the end of the last law.
-//! Does not plan, and does not know what events mean.
+//!
+//! Where drives are simulated ([`Interpolator::waiting_in_position`]) a block that ends in an exact stop (G60, G9 with G601 or G602), or in front of a
+//! block that rests the path (G4, M0, M6, STOPRE), ends when it is told so ([`Interpolator::release`]): until then its last set-point stands, and the
+//! next piece begins on a tick. The end of the program is not waited for under the continuous modes.
+//! Does not plan, does not know what events mean, nor where the axes are.
 
 use super::overlay::Overlay;
-use super::{AxisSetpoint, PathSample, Setpoint};
+use super::{AxisSetpoint, ExactStopWait, PathSample, Setpoint};
 use crate::base::{AxisVector, PerAxis, TimeBase};
 use crate::feed::{Limit, LimitKind, PathState, PlannedPiece, ProgrammedTime};
 use crate::interpreter::{Event, ExactStop};
@@ -38,6 +42,22 @@ pub struct Interpolator {
     /// Axes on their own way.
     overlay: Overlay,
     programmed: ProgrammedTime,
+    /// Block ends wait for the axes.
+    waits: bool,
+    hold: Option<Hold>,
+    /// Time of all waits that are over.
+    waited_s: f64,
+}
+
+/// A block end that waits, or has waited.
+#[derive(Clone, Copy, Debug)]
+struct Hold {
+    /// The first set-point at the end.
+    since_k: u64,
+    /// From the end of the block to that set-point.
+    carry_s: f64,
+    /// The set-point at which the next piece begins, once it is known.
+    released_k: Option<u64>,
 }
 
 /// A piece that began in the cycle that was sampled last.
@@ -69,7 +89,7 @@ pub struct Begun {
     pub rotary_only: bool,
     /// Time of its law.
     pub duration_s: f64,
-    /// It began this long before the tick: at least 0, less than t_s (but for rounding).
+    /// It began this long before the tick: at least 0, less than t_s (but for rounding); t_s after a wait for the axes.
     pub before_tick_s: f64,
     /// Path length of the linear axes where it begins.
     pub path_length_mm: f64,
@@ -100,7 +120,39 @@ impl Interpolator {
             ended: false,
             overlay: Overlay::new(machine),
             programmed: ProgrammedTime::new(machine),
+            waits: false,
+            hold: None,
+            waited_s: 0.0,
         }
+    }
+
+    /// Block ends wait for [`Interpolator::release`].
+    pub fn waiting_in_position(self) -> Self {
+        Self { waits: true, ..self }
+    }
+
+    /// What the set-point that was sampled last waits for, if it stands at a block end that waits.
+    pub fn exact_stop_wait(&self) -> Option<ExactStopWait> {
+        let (hold, active) = (self.hold.filter(|hold| hold.released_k.is_none())?, self.active.as_ref()?);
+        Some(ExactStopWait {
+            since: self.time_base.setpoint_tick(hold.since_k),
+            window: active.piece.path.contour.modes.exact_stop,
+            elsewhere: self.overlay.under_way(),
+        })
+    }
+
+    /// The axes are in position: the next piece begins at set-point `k`, the one that was sampled last.
+    pub fn release(&mut self, k: u64) {
+        if let Some(hold) = &mut self.hold {
+            hold.released_k = Some(k);
+            let cycles = k.saturating_sub(hold.since_k);
+            self.waited_s += hold.carry_s + self.time_base.seconds(cycles * self.time_base.ticks_per_setpoint());
+        }
+    }
+
+    /// Time that block ends have waited so far.
+    pub fn waited_s(&self) -> f64 {
+        self.waited_s
     }
 
     /// Set-point `k`; to be called with k = 0, 1, 2, ... `next` gives the next planned piece, `None` once the path has ended, and is
@@ -130,6 +182,25 @@ impl Interpolator {
             if left_s > self.tolerance_s(k) {
                 return Some(self.setpoint(k, active, time_s));
             }
+            match self.hold {
+                Some(Hold { released_k: Some(from_k), .. }) => {
+                    self.hold = None;
+                    let Some(piece) = self.next.take().or_else(&mut *next) else {
+                        self.ended = true;
+                        return None;
+                    };
+                    self.begin(piece, from_k, 0.0);
+                    continue;
+                }
+                Some(_) => return Some(self.standing(k, active)),
+                None => {
+                    if self.must_wait(next) {
+                        self.hold = Some(Hold { since_k: k, carry_s: -left_s, released_k: None });
+                        let active = self.active.as_ref()?;
+                        return Some(self.setpoint_of(k, active, active.at_end(), active.piece.law.duration_s()));
+                    }
+                }
+            }
             // A next piece that begins up to the tolerance after the tick is only looked at, not begun; one that takes no time
             // (M30 at the end) does not ask for a cycle of its own.
             let following = self.next.take().or_else(&mut *next);
@@ -147,6 +218,33 @@ impl Interpolator {
                 }
             }
         }
+    }
+
+    /// Whether the piece that has ended waits for the axes.
+    fn must_wait(&mut self, next: &mut impl FnMut() -> Option<PlannedPiece>) -> bool {
+        let Some(contour) = self.active.as_ref().filter(|_| self.waits).map(|active| &active.piece.path.contour) else {
+            return false;
+        };
+        let moves = contour.curve().is_some_and(|curve| curve.length_lu() > 0.0);
+        if !contour.stop_at_end || !moves || contour.modes.exact_stop == ExactStop::Setpoint {
+            return false;
+        }
+        if contour.modes.path_mode == PathMode::ExactStop {
+            return true;
+        }
+        if self.next.is_none() {
+            self.next = next();
+        }
+        self.next.as_ref().is_some_and(rests_the_path)
+    }
+
+    /// The end of the active piece, while the axes are waited for.
+    fn standing(&self, k: u64, active: &Active) -> Setpoint {
+        let limit = Limit { kind: LimitKind::InPosition, axis: None };
+        let mut setpoint =
+            self.setpoint_of(k, active, PathState { limit, ..active.at_end() }, active.piece.law.duration_s());
+        setpoint.path.programmed_feed_lu_s = None;
+        setpoint
     }
 
     /// What began in the cycle that was sampled last, in order. The caller may take the events out.
@@ -263,6 +361,13 @@ impl Active {
         let position_lu = if stopped { reached_lu } else { self.length_lu };
         PathState { position_lu, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
     }
+}
+
+/// M0, M6, G4, STOPRE: for these the axes must be where they should be. The program may end before they are.
+fn rests_the_path(piece: &PlannedPiece) -> bool {
+    let contour = &piece.path.contour;
+    let ends = |event: &Event| matches!(event, Event::MFunction(2 | 17 | 30));
+    matches!(contour.kind, PieceKind::Wait { .. }) && !contour.events.iter().any(ends)
 }
 
 /// A wait of 0 s: a function block.

@@ -4,6 +4,7 @@
 
 use crate::base::{AxisVector, PerAxis, Tick};
 use crate::feed::Limit;
+use crate::interpreter::ExactStop;
 use crate::program::BlockRef;
 
 /// Set-point of one axis; `lu` is mm or rad.
@@ -57,4 +58,15 @@ pub struct PathSample {
     pub buffered_blocks: u32,
     /// True where only rotary axes move: the `_lu` above are rad.
     pub rotary_only: bool,
+}
+
+/// A block end that stands until the axes are in position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExactStopWait {
+    /// The first set-point at the end of the block.
+    pub since: Tick,
+    /// The window that the axes must be in.
+    pub window: ExactStop,
+    /// Axes on their own way, which the block does not wait for.
+    pub elsewhere: PerAxis<bool>,
 }

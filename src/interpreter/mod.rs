@@ -13,7 +13,7 @@
 //! * With G91 or IC() an axis also makes good a change of frames since its last motion (SD42440 = 1, the control's default).
 //! * Absolute positions of an endless axis are taken as they are; DC, ACP and ACN choose the way round.
 //! * Blocks with `/` to `/9` are executed, unless their level is among the active skip levels of the [`Setup`].
-//! * G601, G602 and G603 travel in the modes; nothing waits for the axes to be in position yet (K0002). FFWON is active from the start (MD32630 = 0: always as the machine file says).
+//! * G601, G602 and G603 travel in the modes; the kernel waits for the axes where drives are simulated. FFWON is active from the start (MD32630 = 0: always as the machine file says).
 
 mod active_frames;
 mod alarm;

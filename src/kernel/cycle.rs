@@ -4,16 +4,20 @@
 //! set-point of the next cycle is sampled one cycle early, because the fine interpolator runs between two known set-points. Does not
 //! record, print or wait: the caller does.
 
+use super::alarms::{diverged, monitored};
 use super::contour_error::ContourErrorMeter;
 use super::figures::Figures;
+use super::in_position::InPositionWire;
 use super::preparation::{Findings, PieceSource, Preparation};
 use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
 use crate::drive::{AxisSignals, Drive, DriveInput, IdealDrive, Start};
-use crate::interpolator::{AxisSetpoint, Begun, FineInterpolator, Interpolator, Setpoint};
-use crate::interpreter::Setup;
+use crate::feed::{Limit, LimitKind};
+use crate::interpolator::{AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint};
+use crate::interpreter::{ExactStop, Setup};
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::machine::{Axis, Machine};
+use crate::recorder::{RecordRate, SignalChoice};
 use std::sync::Arc;
 
 /// How a cycle ended.
@@ -25,7 +29,7 @@ pub enum Status {
     Finished,
 }
 
-/// One axis at one position tick.
+/// One axis at one position tick, or at a tick of its inner loops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisRow {
     /// When.
@@ -63,6 +67,12 @@ const BEGUN_USUAL: usize = 64;
 struct PositionCycle {
     ticks: u64,
     fine: FineInterpolator,
+    /// Current cycle of a drive, 0 without one.
+    current_ticks: u64,
+    /// Current cycles in a speed cycle.
+    speed_ratio: u32,
+    /// A row every so many current cycles; 0: at the position tick alone.
+    row_every: u32,
 }
 
 impl PositionCycle {
@@ -70,7 +80,9 @@ impl PositionCycle {
     fn new(machine: &Machine, axis: &Axis, drives: bool) -> Self {
         let drive = axis.drive.as_ref().filter(|_| drives);
         let ticks = drive.map_or(machine.cycle.time_base.ticks_per_setpoint(), |drive| drive.position_cycle_ticks);
-        Self { ticks, fine: FineInterpolator::new(machine, ticks) }
+        let current_ticks = drive.map_or(0, |drive| drive.current_cycle_ticks);
+        let speed_ratio = drive.map_or(0, |drive| (drive.speed_cycle_ticks / current_ticks.max(1)) as u32);
+        Self { ticks, fine: FineInterpolator::new(machine, ticks), current_ticks, speed_ratio, row_every: 0 }
     }
 }
 
@@ -91,7 +103,14 @@ pub struct Kernel<S = Preparation> {
     position_cycles: Vec<PositionCycle>,
     /// Ticks between rows: the greatest common divisor of the position cycles.
     row_ticks: u64,
+    /// Goes on behind the last set-point until the axes are in position.
+    until_rest: bool,
+    /// The last set-point, once it stands behind its tick.
+    resting: Option<ExactStopWait>,
+    /// An axis gives more than one row a position cycle.
+    sorts_rows: bool,
     drives: Vec<Drive>,
+    in_position: InPositionWire,
     kinematics: Kinematics,
     contour_error: ContourErrorMeter,
     figures: Figures,
@@ -135,13 +154,21 @@ impl<S: PieceSource> Kernel<S> {
             .collect();
         let position_cycles: Vec<PositionCycle> =
             machine.axes.iter().map(|axis| PositionCycle::new(&machine, axis, drives)).collect();
+        let driven = PerAxis::from_fn(|axis| matches!(stages.get(axis.index()), Some(Drive::Cascade(_))));
+        let in_position = InPositionWire::new(time_base, driven);
+        let interpolator = Interpolator::new(&machine);
+        let interpolator = if in_position.connected() { interpolator.waiting_in_position() } else { interpolator };
         let row_ticks = position_cycles.iter().map(|cycle| cycle.ticks).fold(time_base.ticks_per_setpoint(), gcd);
         Self {
             source,
-            interpolator: Interpolator::new(&machine),
+            interpolator,
             position_cycles,
             row_ticks,
+            until_rest: false,
+            resting: None,
+            sorts_rows: false,
             drives: stages,
+            in_position,
             kinematics,
             contour_error: ContourErrorMeter::new(),
             figures: Figures::default(),
@@ -152,7 +179,33 @@ impl<S: PieceSource> Kernel<S> {
         }
     }
 
-    /// Steps one cycle of t_s. `Running`: [`Kernel::output`] holds it. Errors: the alarm of a drive that has left all bounds.
+    /// With the rows that a recording asks for.
+    pub fn asked_for(self, signals: &SignalChoice) -> Self {
+        self.with_rows_at(signals.rate()).until_rest(signals.ends_at_rest())
+    }
+
+    /// With cycles behind the last set-point, in which it stands until every axis is in position: what delays, filters and lags still hold
+    /// back is seen. They count in no figure but those of the drives.
+    pub fn until_rest(mut self, until_rest: bool) -> Self {
+        self.until_rest = until_rest && self.in_position.connected();
+        self
+    }
+
+    /// With rows of every axis at the rate of its speed or current loop. Figures count position ticks in any case.
+    pub fn with_rows_at(mut self, rate: RecordRate) -> Self {
+        for cycle in &mut self.position_cycles {
+            cycle.row_every = match rate {
+                RecordRate::Position => 0,
+                RecordRate::Speed => cycle.speed_ratio,
+                RecordRate::Current => u32::from(cycle.current_ticks > 0),
+            };
+        }
+        self.sorts_rows = rate != RecordRate::Position;
+        self
+    }
+
+    /// Steps one cycle of t_s. `Running`: [`Kernel::output`] holds it. Errors: the alarm of a drive, which ends the run; the output holds
+    /// what the cycle gave up to there.
     pub fn cycle(&mut self) -> Result<Status, Diagnostic> {
         if self.next_setpoint == 0 {
             self.sample_ahead();
@@ -160,27 +213,65 @@ impl<S: PieceSource> Kernel<S> {
         std::mem::swap(&mut self.output.begun, &mut self.ahead.begun);
         self.output.setpoint = self.ahead.setpoint.take();
         let Some(setpoint) = self.output.setpoint else { return Ok(Status::Finished) };
+        let counts = self.resting.is_none();
         self.sample_ahead();
         for begun in &self.output.begun {
             self.figures.piece(begun);
         }
-        self.figures.setpoint(&setpoint);
-        self.step_drives(&setpoint)?;
+        if counts {
+            self.figures.setpoint(&setpoint);
+        }
+        let stepped = self.step_drives(&setpoint);
+        if self.sorts_rows {
+            self.output.rows.sort_unstable_by_key(|row| (row.tick, row.axis));
+        }
         self.measure(&setpoint);
-        Ok(Status::Running)
+        stepped.map(|()| Status::Running)
     }
 
     fn sample_ahead(&mut self) {
         let Self { interpolator, source, .. } = self;
+        // What the drives said before the set-point that stands now acts from there on.
+        let mut arrived = false;
+        if let Some(before) = self.next_setpoint.checked_sub(1)
+            && self.in_position.take(self.machine.cycle.time_base.setpoint_tick(before)).is_some()
+        {
+            interpolator.release(before);
+            source.waited(interpolator.waited_s());
+            arrived = true;
+        }
         self.ahead.begun.clear();
         self.ahead.setpoint = interpolator.sample(self.next_setpoint, &mut || source.next_piece());
         interpolator.swap_begun(&mut self.ahead.begun);
+        if self.ahead.setpoint.is_none() && self.until_rest {
+            self.stand(arrived);
+        }
         self.next_setpoint += 1;
+    }
+
+    /// Behind the last set-point: it stands for another cycle, unless all axes have arrived.
+    fn stand(&mut self, arrived: bool) {
+        let Some(last) = self.output.setpoint else { return };
+        let tick = self.machine.cycle.time_base.setpoint_tick(self.next_setpoint);
+        match self.resting {
+            Some(_) if arrived => return,
+            Some(_) => {}
+            None => {
+                self.resting =
+                    Some(ExactStopWait { since: last.tick, window: ExactStop::Fine, elsewhere: PerAxis::splat(false) });
+            }
+        }
+        let stands = |axis| AxisSetpoint { position_lu: last.axes[axis].position_lu, ..AxisSetpoint::default() };
+        let mut standing = Setpoint { tick, axes: PerAxis::from_fn(stands), ..last };
+        standing.path.limit = Limit { kind: LimitKind::InPosition, axis: None };
+        standing.path.programmed_feed_lu_s = None;
+        self.ahead.setpoint = Some(standing);
     }
 
     /// All position ticks from this set-point up to the next one (only the first after the last set-point).
     fn step_drives(&mut self, setpoint: &Setpoint) -> Result<(), Diagnostic> {
         self.output.rows.clear();
+        let wait = self.resting.or(self.interpolator.exact_stop_wait());
         let last = self.ahead.setpoint.is_none();
         let next = self.ahead.setpoint.unwrap_or(*setpoint);
         let ticks = if last { 1 } else { self.machine.cycle.time_base.ticks_per_setpoint() };
@@ -197,13 +288,29 @@ impl<S: PieceSource> Kernel<S> {
                     feedforward_active: setpoint.feedforward_active,
                 };
                 let drive = &mut self.drives[axis.index()];
-                let signals = drive.step(input);
                 let tick = Tick(setpoint.tick.0 + offset);
+                let signals = match cycle.row_every {
+                    0 => drive.step(input),
+                    _ if last => drive.step(input),
+                    every => {
+                        let row = |tick, signals| AxisRow { tick, axis, setpoint: sent, signals };
+                        inner_rows(drive, input, every, |n, signals| {
+                            self.output.rows.push(row(Tick(tick.0 + u64::from(n) * cycle.current_ticks), signals));
+                        })
+                    }
+                };
                 if !drive.is_finite() {
                     return Err(diverged(&self.machine, axis, tick));
                 }
                 self.figures.drive(axis, &signals);
-                self.output.rows.push(AxisRow { tick, axis, setpoint: sent, signals });
+                let row = AxisRow { tick, axis, setpoint: sent, signals };
+                self.output.rows.push(row);
+                if let Some(wait) = &wait {
+                    self.in_position.hear(tick, axis, wait, &signals);
+                }
+                if let Some(alarm) = monitored(&self.machine, setpoint.path.block.line, &row) {
+                    return Err(alarm);
+                }
             }
         }
         Ok(())
@@ -234,6 +341,11 @@ impl<S: PieceSource> Kernel<S> {
         &self.figures
     }
 
+    /// Time that exact stops have waited for the axes.
+    pub fn waited_s(&self) -> f64 {
+        self.interpolator.waited_s()
+    }
+
     /// The machine.
     pub fn machine(&self) -> &Arc<Machine> {
         &self.machine
@@ -245,13 +357,15 @@ impl<S: PieceSource> Kernel<S> {
     }
 }
 
-/// The alarm of a drive whose state is no longer finite.
-pub(super) fn diverged(machine: &Machine, axis: AxisId, tick: Tick) -> Diagnostic {
-    let name = &machine.axis(axis).name;
-    let time_s = machine.cycle.time_base.time_s(tick);
-    Diagnostic::error(
-        "D0001",
-        format!("axis {name} has left all bounds at {time_s:.4} s: its control loop is unstable"),
-    )
-    .help(format!("lower axes.{name}.drive.speed_gain_n_m_s_per_rad, current_gain_v_per_a or position_gain_per_s"))
+/// One position cycle. Returns the signals at its tick, and gives `each` those at every `every`-th current tick behind it.
+fn inner_rows(drive: &mut Drive, input: DriveInput, every: u32, mut each: impl FnMut(u32, AxisSignals)) -> AxisSignals {
+    let mut first = AxisSignals::default();
+    drive.step_each(input, |n, signals| {
+        if n == 0 {
+            first = *signals;
+        } else if n.is_multiple_of(every) {
+            each(n, *signals);
+        }
+    });
+    first
 }

@@ -3,7 +3,8 @@
 //! In: [`SetpointTable`]. Out: axis rows, as the running kernel records them. Velocity, acceleration and jerk of the set-point are
 //! backward differences here: a table has no analytic ones. Does not plan or interpolate.
 
-use super::cycle::{AxisRow, diverged};
+use super::alarms::diverged;
+use super::cycle::AxisRow;
 use super::figures::Figures;
 use super::record::{FollowRow, record_alarm, record_follow};
 use super::setpoint_table::{SetpointTable, row_ticks};
@@ -51,6 +52,7 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
         Some(path) => {
             let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, &[]);
             setup.signals = options.signals;
+            setup.decimation = options.signals.decimation();
             setup.mantissa_bits = options.mantissa_bits;
             Some(Recorder::to_file(path, &setup)?)
         }

@@ -4,10 +4,12 @@
 //! [`Kernel::cycle`] steps one t_s; a clone of the kernel is a snapshot of its whole state. [`run`] is the loop with threads, pace and
 //! recording around it. Does not print.
 
+mod alarms;
 mod contour_error;
 mod cycle;
 mod figures;
 mod follow;
+mod in_position;
 mod preparation;
 mod record;
 mod run;
@@ -19,6 +21,7 @@ mod what_if;
 pub use cycle::{AxisRow, CycleOutput, Kernel, Status};
 pub use figures::Figures;
 pub use follow::{FollowOptions, FollowOutcome, follow};
+pub use in_position::InPosition;
 pub use preparation::{Findings, PieceSource, Preparation};
 pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
 pub use setpoint_table::SetpointTable;

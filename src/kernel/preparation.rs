@@ -19,6 +19,11 @@ pub trait PieceSource {
     /// The next piece in path order; `None` once the program has ended or an alarm has stopped it.
     fn next_piece(&mut self) -> Option<PlannedPiece>;
 
+    /// How long block ends have waited for the axes so far; told before the piece after such an end is asked for.
+    fn waited(&mut self, waited_s: f64) {
+        let _ = waited_s;
+    }
+
     /// What preparation had to say on the way to the pieces handed out; complete once `next_piece` has returned `None`.
     fn take_findings(&mut self) -> Findings;
 }
@@ -45,6 +50,8 @@ pub struct Preparation {
     time_base: TimeBase,
     /// The interpreter waits for the time at which the path rests.
     stopped: bool,
+    /// Time of all waits for the axes.
+    waited_s: f64,
     /// What the interpreter made of the program since the last call of `take_moves`; `None`: not kept.
     moves: Option<Vec<Move>>,
 }
@@ -62,6 +69,7 @@ impl Preparation {
             finished: false,
             time_base: machine.cycle.time_base,
             stopped: false,
+            waited_s: 0.0,
             moves: None,
         }
     }
@@ -83,9 +91,6 @@ impl Preparation {
 
     /// Executes one more block of the program and plans what follows from it.
     fn extend(&mut self) {
-        if std::mem::take(&mut self.stopped) {
-            self.interpreter.tell_main_run(self.main_run());
-        }
         let moved = self.interpreter.next_move();
         self.stopped = matches!(&moved, Ok(Some(next)) if next.kind == MoveKind::StopPreparation);
         if let (Some(moves), Ok(Some(next))) = (&mut self.moves, &moved) {
@@ -120,12 +125,12 @@ impl Preparation {
         }
     }
 
-    /// Where the path rests that has been handed out: at the first set-point at or after its end. Counted from planned durations,
-    /// so that it does not depend on how far the cycle is.
+    /// Where the path rests that has been handed out: at the first set-point at or after its end. Counted from planned durations and
+    /// from the waits that the cycle has told, so that it does not depend on how far the cycle is.
     fn main_run(&self) -> MainRun {
         let (elapsed_s, cutting_time_s) = self.planner.elapsed_s();
         let period_s = self.time_base.setpoint_period_s();
-        let k = (elapsed_s / period_s * (1.0 - SAME_TIME_RATIO)).ceil().max(0.0) as u64;
+        let k = ((elapsed_s + self.waited_s) / period_s * (1.0 - SAME_TIME_RATIO)).ceil().max(0.0) as u64;
         MainRun { time_s: self.time_base.time_s(self.time_base.setpoint_tick(k)), cutting_time_s }
     }
 
@@ -133,10 +138,9 @@ impl Preparation {
     pub(super) fn take_warnings(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.warnings)
     }
-}
 
-impl PieceSource for Preparation {
-    fn next_piece(&mut self) -> Option<PlannedPiece> {
+    /// The next piece; `None` at the end, and where the interpreter waits for the time at which the path rests.
+    pub(super) fn piece_ahead(&mut self) -> Option<PlannedPiece> {
         loop {
             if let Some(piece) = self.planner.pop() {
                 if let Some((block, alarm)) = self.planner.take_alarm() {
@@ -152,8 +156,37 @@ impl PieceSource for Preparation {
                 }
                 return None;
             }
+            if self.stopped {
+                return None;
+            }
             self.extend();
         }
+    }
+
+    /// The interpreter waits for the time at which the path rests: all pieces up to there have been handed out.
+    pub(super) fn stopped(&self) -> bool {
+        self.stopped && !self.finished
+    }
+
+    /// Tells the interpreter that time. What has been waited by now must be known.
+    pub(super) fn go_on(&mut self) {
+        self.stopped = false;
+        self.interpreter.tell_main_run(self.main_run());
+    }
+}
+
+impl PieceSource for Preparation {
+    fn next_piece(&mut self) -> Option<PlannedPiece> {
+        loop {
+            match self.piece_ahead() {
+                None if self.stopped() => self.go_on(),
+                next => return next,
+            }
+        }
+    }
+
+    fn waited(&mut self, waited_s: f64) {
+        self.waited_s = waited_s;
     }
 
     fn take_findings(&mut self) -> Findings {

@@ -93,9 +93,11 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
     if options.threads > 1 {
         let source = PreparationThread::spawn(preparation)
             .map_err(|error| RunError(Diagnostic::error("K0001", format!("no thread for preparation: {error}"))))?;
-        drive_loop(Kernel::with_source(machine, source, options.drives), options, progress)
+        let kernel = Kernel::with_source(machine, source, options.drives).asked_for(&options.signals);
+        drive_loop(kernel, options, progress)
     } else {
-        drive_loop(Kernel::with_source(machine, preparation, options.drives), options, progress)
+        let kernel = Kernel::with_source(machine, preparation, options.drives).asked_for(&options.signals);
+        drive_loop(kernel, options, progress)
     }
 }
 
@@ -115,14 +117,12 @@ fn drive_loop<S: PieceSource>(
     let mut recorder = open_recorder(&options, &machine)?;
     let mut pacer = options.pace_ratio.map(|ratio| Pacer::new(ratio, &machine));
     let mut drive_alarm = None;
-    loop {
+    while drive_alarm.is_none() {
         match kernel.cycle() {
             Ok(Status::Running) => {}
             Ok(Status::Finished) => break,
-            Err(alarm) => {
-                drive_alarm = Some(alarm);
-                break;
-            }
+            // What the cycle gave up to the alarm is recorded all the same.
+            Err(alarm) => drive_alarm = Some(alarm),
         }
         if let Some(pacer) = &mut pacer {
             pacer.wait();
@@ -152,6 +152,7 @@ fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Opt
     let mut setup = RecordingSetup::new(machine, &options.machine.name, &options.machine.text_as_used, programs);
     setup.mantissa_bits = options.mantissa_bits;
     setup.signals = options.signals;
+    setup.decimation = options.signals.decimation();
     Recorder::to_file(path, &setup).map(Some).map_err(RunError)
 }
 
@@ -171,9 +172,17 @@ fn conclude<S: PieceSource>(
     if kernel.figures().blocks == 0 && drive_alarm.is_none() && findings.alarm.is_none() {
         warnings.push(Diagnostic::warning("K0007", "the program moves no axis"));
     }
-    if kernel.figures().exact_stops > 0 {
-        let message = "an exact stop ends when its set-point arrives: waiting until the axes are in position is not simulated yet";
+    if kernel.figures().exact_stops > 0 && !options.drives {
+        let message = "an exact stop (G601, G602) ends when its set-point arrives: waiting until the axes are in position needs the drives, \
+                       which are left out here; `sollwert run` waits";
         warnings.push(Diagnostic::warning("K0002", message));
+    }
+    if kernel.waited_s() > 0.0 && !options.overrides.changes().is_empty() {
+        let message = format!(
+            "the times of --override are those of the path: {:.3} s in which exact stops wait for the axes are not counted in them",
+            kernel.waited_s()
+        );
+        warnings.push(Diagnostic::warning("K0009", message));
     }
     let alarm = drive_alarm.or(findings.alarm);
     if let Some(alarm) = &alarm {
@@ -189,7 +198,8 @@ fn conclude<S: PieceSource>(
         None => None,
         Some(mut recorder) => {
             if let Some(alarm) = &alarm {
-                let tick = machine.cycle.time_base.setpoint_tick(kernel.figures().setpoints);
+                let setpoint = machine.cycle.time_base.setpoint_tick(kernel.figures().setpoints);
+                let tick = kernel.output().rows.last().map_or(setpoint, |row| row.tick.max(setpoint));
                 record_alarm(&mut recorder, tick, alarm);
             }
             let document = serde_json::to_string(&summary)

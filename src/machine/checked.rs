@@ -410,6 +410,8 @@ pub struct DriveData {
     pub in_position_coarse_lu: f64,
     /// MD36010.
     pub in_position_fine_lu: f64,
+    /// What the control watches besides.
+    pub monitoring: MonitoringData,
     /// T_p in ticks.
     pub position_cycle_ticks: u64,
     /// T_v in ticks.
@@ -450,6 +452,19 @@ pub struct DriveData {
     pub encoder: EncoderData,
     /// Filters, compensations and limits besides the cascade.
     pub options: DriveOptions,
+}
+
+/// What the control watches; infinite: not watched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MonitoringData {
+    /// MD36020.
+    pub positioning_time_s: f64,
+    /// MD36030.
+    pub standstill_lu: f64,
+    /// MD36040.
+    pub standstill_delay_s: f64,
+    /// MD36400.
+    pub contour_lu: f64,
 }
 
 /// `[axes.*.motor]`.

@@ -4,7 +4,7 @@
 //! drive is an ideal axis; half a drive is an error. Model: models/drive.md section 2; what is rejected: section 8.
 
 use super::axis::{by_kind, lu};
-use super::checked::{AxisLimits, DriveData, EncoderData, MechanicsData, MotorData};
+use super::checked::{AxisLimits, DriveData, EncoderData, MechanicsData, MonitoringData, MotorData};
 use super::clock::LoopCycles;
 use super::drive_options::{options, small_lu};
 use super::section::Section;
@@ -60,6 +60,12 @@ fn controllers<'f>(
         identified: drive.flag("identified"),
         in_position_coarse_lu,
         in_position_fine_lu,
+        monitoring: MonitoringData {
+            positioning_time_s: s_from_ms(drive.number("positioning_time_ms")),
+            standstill_lu: small_lu(&drive, "standstill_um", "standstill_deg"),
+            standstill_delay_s: s_from_ms(drive.number("standstill_delay_ms")),
+            contour_lu: small_lu(&drive, "contour_monitoring_um", "contour_monitoring_deg"),
+        },
         // Ticks are known when all axes have been read: `clock` fills them in.
         position_cycle_ticks: 0,
         speed_cycle_ticks: 0,

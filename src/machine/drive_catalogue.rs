@@ -38,6 +38,46 @@ pub(super) const DRIVE: &[Key] = &[
     Key::new("in_position_fine_deg", "deg", POSITIVE, Value(0.01), "exact-stop window, fine")
         .rotary("in_position_fine_um")
         .md("MD36010"),
+    Key::new(
+        "positioning_time_ms",
+        "ms",
+        OR_INFINITE,
+        Value(1000.0),
+        "time from the end of a motion to exact stop fine; inf = not monitored",
+    )
+    .md("MD36020"),
+    Key::new("standstill_um", "µm", OR_INFINITE, Value(200.0), "deviation allowed at standstill; inf = not monitored")
+        .linear("standstill_deg")
+        .md("MD36030"),
+    Key::new("standstill_deg", "deg", OR_INFINITE, Value(0.2), "deviation allowed at standstill; inf = not monitored")
+        .rotary("standstill_um")
+        .md("MD36030"),
+    Key::new(
+        "standstill_delay_ms",
+        "ms",
+        NOT_NEGATIVE,
+        Value(400.0),
+        "time from the end of a motion to standstill monitoring",
+    )
+    .md("MD36040"),
+    Key::new(
+        "contour_monitoring_um",
+        "µm",
+        OR_INFINITE,
+        Value(1000.0),
+        "contour monitoring: deviation allowed between axis and its model; inf = not monitored",
+    )
+    .linear("contour_monitoring_deg")
+    .md("MD36400"),
+    Key::new(
+        "contour_monitoring_deg",
+        "deg",
+        OR_INFINITE,
+        Value(1.0),
+        "contour monitoring: deviation allowed between axis and its model; inf = not monitored",
+    )
+    .rotary("contour_monitoring_um")
+    .md("MD36400"),
     Key::new("position_cycle_ms", "ms", POSITIVE, Required, "[T_p] t_s is a whole multiple of it").md("MD10061"),
     Key::new("speed_cycle_us", "µs", LOOP_CYCLE, Required, "[T_v] the position cycle is a whole multiple of it")
         .md("p0115[1], MD1001"),

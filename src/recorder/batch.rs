@@ -17,11 +17,34 @@ pub(super) const BATCHES: usize = 16;
 /// One message to be.
 #[derive(Clone, Debug)]
 pub(super) enum Record {
-    Axis { tick: Tick, axis: AxisId, setpoint: AxisSetpoint, signals: AxisSignals },
-    Path { tick: Tick, sample: PathSample, contour_error_mm: Option<f64> },
-    Pose { tick: Tick, which: ToolPose, position_mm: [f64; 3], quaternion_xyzw: [f64; 4] },
-    Event { tick: Tick, block: Option<BlockRef>, event: EventRecord },
-    Program { tick: Tick, program: OpenedProgram },
+    /// `due`: bits of the fields that are recorded at this tick.
+    Axis {
+        tick: Tick,
+        axis: AxisId,
+        setpoint: AxisSetpoint,
+        signals: AxisSignals,
+        due: u32,
+    },
+    Path {
+        tick: Tick,
+        sample: PathSample,
+        contour_error_mm: Option<f64>,
+    },
+    Pose {
+        tick: Tick,
+        which: ToolPose,
+        position_mm: [f64; 3],
+        quaternion_xyzw: [f64; 4],
+    },
+    Event {
+        tick: Tick,
+        block: Option<BlockRef>,
+        event: EventRecord,
+    },
+    Program {
+        tick: Tick,
+        program: OpenedProgram,
+    },
 }
 
 impl Record {

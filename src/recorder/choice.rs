@@ -1,12 +1,45 @@
 //! Which signals go into a recording: `--record X.current,Y.*`.
 //!
 //! In: the words of the user, the machine's axes. Out: [`SignalChoice`]. `/path` and `/event` are always recorded: without them
-//! no sample knows its line. Does not decide how often a signal is recorded.
+//! no sample knows its line. A choice also says how often: at which rate of the drives, every how many samples. Does not thin out.
 
 use super::schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, SignalSource, TOOL_TOPICS};
 use crate::base::diagnostics::nearest;
 use crate::base::{AxisId, Diagnostic, PerAxis, SourceText, Span};
 use crate::machine::Machine;
+use std::num::NonZeroU32;
+
+/// Which cycle of an axis gives samples: `--record-rate`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum RecordRate {
+    /// T_p.
+    #[default]
+    Position,
+    /// T_v.
+    Speed,
+    /// T_i.
+    Current,
+}
+
+impl RecordRate {
+    /// Words of `--record-rate`, in order of the rates.
+    pub const WORDS: [&'static str; 3] = ["position", "speed", "current"];
+
+    /// By its word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        match word {
+            "position" => Some(Self::Position),
+            "speed" => Some(Self::Speed),
+            "current" => Some(Self::Current),
+            _ => None,
+        }
+    }
+
+    /// As in metadata.
+    pub fn word(self) -> &'static str {
+        Self::WORDS[self as usize]
+    }
+}
 
 /// A set of axis fields and tool poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +48,11 @@ pub struct SignalChoice {
     fields: PerAxis<u32>,
     /// By `ToolPose::index`.
     poses: [bool; TOOL_TOPICS.len()],
+    /// Every how many samples of its axis a field is recorded.
+    every: PerAxis<[u16; AXIS_FIELD_COUNT]>,
+    rate: RecordRate,
+    decimation: NonZeroU32,
+    until_rest: bool,
 }
 
 /// Bits of all fields.
@@ -29,19 +67,75 @@ impl Default for SignalChoice {
 impl SignalChoice {
     /// Everything.
     pub fn all() -> Self {
-        Self { fields: PerAxis::splat(ALL_FIELDS), poses: [true; TOOL_TOPICS.len()] }
+        Self::of(ALL_FIELDS, [true; TOOL_TOPICS.len()])
+    }
+
+    /// The same fields of every axis, every sample.
+    fn of(fields: u32, poses: [bool; TOOL_TOPICS.len()]) -> Self {
+        Self {
+            fields: PerAxis::splat(fields),
+            poses,
+            every: PerAxis::splat([1; AXIS_FIELD_COUNT]),
+            rate: RecordRate::Position,
+            decimation: NonZeroU32::MIN,
+            until_rest: false,
+        }
+    }
+
+    /// The same signals, at another rate.
+    pub fn at_rate(self, rate: RecordRate) -> Self {
+        Self { rate, ..self }
+    }
+
+    /// The same signals, every n-th sample of axes and path only; what a word says of its signals (`/10`) comes on top.
+    pub fn decimated(self, decimation: NonZeroU32) -> Self {
+        Self { decimation, ..self }
+    }
+
+    /// The same signals, up to the place where all axes have come to rest behind the last set-point (`true`), or up to that set-point.
+    pub fn until_rest(self, until_rest: bool) -> Self {
+        Self { until_rest, ..self }
+    }
+
+    /// Whether the recording goes on until the axes are at rest.
+    pub fn ends_at_rest(&self) -> bool {
+        self.until_rest
+    }
+
+    /// At which rate the axes are recorded.
+    pub fn rate(&self) -> RecordRate {
+        self.rate
+    }
+
+    /// Every how many samples of axes and path are recorded.
+    pub fn decimation(&self) -> NonZeroU32 {
+        self.decimation
+    }
+
+    /// Chosen fields of an axis by how often they are recorded: every so many samples, and bits of the fields.
+    pub fn groups(&self, axis: AxisId) -> Vec<(u32, u32)> {
+        let mut groups: Vec<(u32, u32)> = Vec::new();
+        for field in self.fields(axis) {
+            let every = u32::from(self.every[axis][field]);
+            match groups.iter_mut().find(|(known, _)| *known == every) {
+                Some((_, fields)) => *fields |= 1 << field,
+                None => groups.push((every, 1 << field)),
+            }
+        }
+        groups
     }
 
     /// What exists without drives: position, velocity, acceleration and jerk of the set-points, and the tool at the set-point.
     pub fn setpoints() -> Self {
-        Self { fields: PerAxis::splat(fields_of(|source| source == SignalSource::Interpolator)), poses: [true, false] }
+        Self::of(fields_of(|source| source == SignalSource::Interpolator), [true, false])
     }
 
-    /// What both choices hold.
+    /// What both choices hold, as often as this one says.
     pub fn and(&self, other: &Self) -> Self {
         Self {
             fields: PerAxis::from_fn(|axis| self.fields[axis] & other.fields[axis]),
             poses: std::array::from_fn(|i| self.poses[i] && other.poses[i]),
+            ..*self
         }
     }
 
@@ -67,15 +161,16 @@ impl SignalChoice {
         for axis in machine.axis_ids() {
             fields[axis] = self.fields[axis] & existing_fields(machine, axis);
         }
-        Self { fields, poses: self.poses }
+        Self { fields, ..*self }
     }
 
     /// Reads a list of words between commas. A word is `AXIS.FIELD`, where `*` stands for any axis, or for any part of a field
-    /// name (with or without its unit); `AXIS` alone means all of its fields; `tool`, `tool.setpoint` and `tool.actual` are the
+    /// name (with or without its unit); `AXIS` alone means all of its fields; `/10` behind it means every tenth sample, and of several
+    /// words for one signal the most frequent counts; `tool`, `tool.setpoint` and `tool.actual` are the
     /// poses; `path` and `event` may be named, and are recorded in any case.
     pub fn parse(text: &str, machine: &Machine) -> Result<Self, Diagnostic> {
         let source = SourceText::new("--record", text);
-        let mut choice = Self { fields: PerAxis::splat(0), poses: [false; TOOL_TOPICS.len()] };
+        let mut choice = Self::of(0, [false; TOOL_TOPICS.len()]);
         let mut start = 0;
         for part in text.split(',') {
             let word = part.trim();
@@ -99,6 +194,10 @@ impl SignalChoice {
     }
 
     fn add_axis_word(&mut self, word: &str, machine: &Machine) -> Result<(), Unknown> {
+        let (word, every) = match word.split_once('/') {
+            Some((word, times)) => (word.trim_end(), every(times.trim_start())?),
+            None => (word, 1),
+        };
         let (axis_name, pattern) = word.split_once('.').unwrap_or((word, "*"));
         let axes: Vec<AxisId> = match axis_name {
             "*" => machine.axis_ids().collect(),
@@ -112,6 +211,12 @@ impl SignalChoice {
         for axis in axes {
             let fields = named & existing_fields(machine, axis);
             found |= fields != 0;
+            for (field, times) in
+                self.every[axis].iter_mut().enumerate().filter(|(field, _)| fields & (1 << field) != 0)
+            {
+                let known = self.fields[axis] & (1 << field) != 0;
+                *times = if known { every.min(*times) } else { every };
+            }
             self.fields[axis] |= fields;
         }
         if found {
@@ -138,6 +243,16 @@ impl Unknown {
     fn place_in(self, source: &SourceText, span: Span) -> Diagnostic {
         Diagnostic::error("R0020", self.message).at(source.place(span, "")).help(self.help)
     }
+}
+
+/// The number behind `/`.
+fn every(text: &str) -> Result<u16, Unknown> {
+    text.parse::<u16>().ok().filter(|every| *every > 0).ok_or_else(|| {
+        Unknown::new(
+            format!("`{text}` is not a number of samples from 1 to {}", u16::MAX),
+            "write X.current/10 for every tenth sample of a signal",
+        )
+    })
 }
 
 fn unknown_axis(name: &str, machine: &Machine) -> Unknown {

@@ -6,8 +6,8 @@
 use super::schema::proto::foxglove::PoseInFrame;
 use super::schema::proto::sollwert::{Event, Path};
 use super::schema::{
-    AXIS_FIELD_COUNT, AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, PATH, PATH_TOPIC, POSE_IN_FRAME,
-    ROTARY_AXIS, TOOL_TOPICS, ToolPose,
+    AXIS_FIELD_COUNT, AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, MONITORING_FIELD, PATH,
+    PATH_TOPIC, POSE_IN_FRAME, ROTARY_AXIS, TOOL_TOPICS, ToolPose,
 };
 use crate::base::AxisKind;
 use prost::Message as _;
@@ -67,12 +67,14 @@ impl AxisSample {
             let (tag, wire) = decode_key(&mut data)?;
             let field = tag as usize - 1;
             let value = match (field, wire) {
-                (FLAGS_FIELD, WireType::Varint) => {
-                    let mut flags = 0_u32;
-                    prost::encoding::uint32::merge(wire, &mut flags, &mut data, DecodeContext::default())?;
-                    f64::from(flags)
+                (FLAGS_FIELD | MONITORING_FIELD, WireType::Varint) => {
+                    let mut bits = 0_u32;
+                    prost::encoding::uint32::merge(wire, &mut bits, &mut data, DecodeContext::default())?;
+                    f64::from(bits)
                 }
-                (field, WireType::SixtyFourBit) if field < FLAGS_FIELD => {
+                (field, WireType::SixtyFourBit)
+                    if field < AXIS_FIELD_COUNT && !matches!(field, FLAGS_FIELD | MONITORING_FIELD) =>
+                {
                     let mut value = 0.0;
                     prost::encoding::double::merge(wire, &mut value, &mut data, DecodeContext::default())?;
                     value

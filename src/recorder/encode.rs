@@ -8,7 +8,7 @@ use super::event::EventRecord;
 use super::schema::proto::foxglove::{Pose, PoseInFrame, Quaternion, Vector3};
 use super::schema::proto::google::protobuf::Timestamp;
 use super::schema::proto::sollwert::{Event, Path};
-use super::schema::{AXIS_FIELDS, FLAGS_FIELD, FieldUnit, POSE_FRAME};
+use super::schema::{AXIS_FIELDS, FLAGS_FIELD, FieldUnit, MONITORING_FIELD, POSE_FRAME};
 use crate::base::units::{MM_PER_M, NS_PER_S, deg_from_rad, mm_min_from_mm_s};
 use crate::base::{AxisKind, PerAxis};
 use crate::drive::AxisSignals;
@@ -60,11 +60,17 @@ impl AxisEncoder {
         Self { fields, kind, precision }
     }
 
-    pub(super) fn encode(&self, setpoint: &AxisSetpoint, signals: &AxisSignals, buffer: &mut Vec<u8>) {
-        for &i in &self.fields {
+    /// Appends the chosen fields whose bit is set in `due`.
+    pub(super) fn encode(&self, setpoint: &AxisSetpoint, signals: &AxisSignals, due: u32, buffer: &mut Vec<u8>) {
+        for &i in self.fields.iter().filter(|field| due & (1 << **field) != 0) {
             let tag = i as u32 + 1;
-            if i == FLAGS_FIELD {
-                prost::encoding::uint32::encode(tag, &signals.flags, buffer);
+            let bits = match i {
+                FLAGS_FIELD => Some(signals.flags),
+                MONITORING_FIELD => Some(signals.monitoring),
+                _ => None,
+            };
+            if let Some(bits) = bits {
+                prost::encoding::uint32::encode(tag, &bits, buffer);
                 continue;
             }
             let field = &AXIS_FIELDS[i];

@@ -7,7 +7,7 @@
 use super::decode::{AxisSample, TopicKind};
 use super::reader::Recording;
 use super::schema::proto::sollwert::Path as PathMessage;
-use super::schema::{AXIS_FIELDS, FLAGS_FIELD, PATH_FIELDS};
+use super::schema::{AXIS_FIELDS, FLAGS_FIELD, MONITORING_FIELD, PATH_FIELDS};
 use super::target::{Target, WholeFile};
 use crate::base::Diagnostic;
 use crate::base::units::NS_PER_S;
@@ -101,6 +101,8 @@ fn write_csv(recording: &Recording, output: &mut impl Write) -> Result<ExportRep
 struct Cells {
     topic: usize,
     fields: Vec<usize>,
+    /// Last value of each field of an axis: a field may be recorded less often than others.
+    held: Vec<Option<f64>>,
     text: Vec<u8>,
 }
 
@@ -198,15 +200,18 @@ impl Table {
 impl Cells {
     /// Empty until the first message.
     fn empty(topic: usize, fields: Vec<usize>) -> Self {
-        Self { topic, text: vec![b','; fields.len()], fields }
+        Self { topic, text: vec![b','; fields.len()], held: vec![None; fields.len()], fields }
     }
 
     fn set_axis(&mut self, sample: &AxisSample) {
         self.text.clear();
-        for &field in &self.fields {
+        for (&field, held) in self.fields.iter().zip(&mut self.held) {
             self.text.push(b',');
-            match sample.get(field) {
-                Some(flags) if field == FLAGS_FIELD => push_integer(&mut self.text, flags as u64),
+            *held = sample.get(field).or(*held);
+            match *held {
+                Some(bits) if matches!(field, FLAGS_FIELD | MONITORING_FIELD) => {
+                    push_integer(&mut self.text, bits as u64);
+                }
                 Some(value) => push_number(&mut self.text, value),
                 None => {}
             }

@@ -10,7 +10,7 @@ use super::setup::{RecordingSetup, SUMMARY_METADATA};
 use super::target::Target;
 use super::writer::{Fault, RecordingSummary, RecordingWriter, write_fault};
 use crate::base::units::NS_PER_S;
-use crate::base::{AxisId, Diagnostic, PerAxis, Tick, TimeBase};
+use crate::base::{AXES_MAX, AxisId, Diagnostic, PerAxis, Tick, TimeBase};
 use crate::drive::AxisSignals;
 use crate::interpolator::{AxisSetpoint, PathSample};
 use crate::interpreter::Event;
@@ -39,7 +39,7 @@ pub struct Recorder {
     border: Tick,
     recorded_axes: PerAxis<bool>,
     attached: Vec<ProgramId>,
-    axis_decimators: PerAxis<Decimator>,
+    axis_decimators: PerAxis<AxisDecimator>,
     path_decimator: Decimator,
 }
 
@@ -88,7 +88,7 @@ impl Recorder {
             border: second_after(&time_base, Tick(0)),
             recorded_axes: PerAxis::from_fn(|axis| axis.index() < setup.machine.axes.len() && signals.axis(axis)),
             attached: setup.programs.iter().map(|program| program.id).collect(),
-            axis_decimators: PerAxis::from_fn(|_| Decimator::new(every)),
+            axis_decimators: PerAxis::from_fn(|axis| AxisDecimator::new(&signals.groups(axis), every)),
             path_decimator: Decimator::new(every),
         })
     }
@@ -98,9 +98,9 @@ impl Recorder {
         if !self.recorded_axes[axis] {
             return;
         }
-        let record = Record::Axis { tick, axis, setpoint: *setpoint, signals: *signals };
-        if let Some(record) = self.axis_decimators[axis].pass(record) {
-            self.push(record);
+        let due = self.axis_decimators[axis].due(tick, setpoint, signals);
+        if due != 0 {
+            self.push(Record::Axis { tick, axis, setpoint: *setpoint, signals: *signals, due });
         }
     }
 
@@ -151,8 +151,8 @@ impl Recorder {
 
     /// Writes the figures of the run (the document of `run --json`) and the index, and waits for the disk.
     pub fn finish(mut self, summary_json: &str) -> Result<RecordingSummary, Diagnostic> {
-        let mut last: Vec<Record> =
-            self.axis_decimators.as_mut_slice().iter_mut().filter_map(Decimator::rest).collect();
+        let axes = AxisId::first(AXES_MAX);
+        let mut last: Vec<Record> = axes.filter_map(|axis| self.axis_decimators[axis].rest(axis)).collect();
         last.extend(self.path_decimator.rest());
         last.sort_by_key(Record::tick);
         for record in last {
@@ -242,6 +242,40 @@ impl Decimator {
     /// The last record, if it did not pass: an end posture is never lost.
     fn rest(&mut self) -> Option<Record> {
         self.last.take()
+    }
+}
+
+/// Says which fields of an axis are due at a sample, and keeps the last values of those that were not.
+#[derive(Clone, Debug)]
+struct AxisDecimator {
+    /// Every so many samples these fields.
+    groups: Vec<(u64, u32)>,
+    samples: u64,
+    /// The last sample, with the fields of it that were not due.
+    last: Option<(Tick, AxisSetpoint, AxisSignals, u32)>,
+}
+
+impl AxisDecimator {
+    fn new(groups: &[(u32, u32)], decimation: u32) -> Self {
+        let times = |every: u32| u64::from(every) * u64::from(decimation);
+        Self { groups: groups.iter().map(|(every, fields)| (times(*every), *fields)).collect(), samples: 0, last: None }
+    }
+
+    fn due(&mut self, tick: Tick, setpoint: &AxisSetpoint, signals: &AxisSignals) -> u32 {
+        let (mut due, mut left) = (0, 0);
+        for (every, fields) in &self.groups {
+            let place = if self.samples.is_multiple_of(*every) { &mut due } else { &mut left };
+            *place |= fields;
+        }
+        self.samples += 1;
+        self.last = (left != 0).then_some((tick, *setpoint, *signals, left));
+        due
+    }
+
+    /// What is left of the last sample: an end posture is never lost.
+    fn rest(&mut self, axis: AxisId) -> Option<Record> {
+        let (tick, setpoint, signals, due) = self.last.take()?;
+        Some(Record::Axis { tick, axis, setpoint, signals, due })
     }
 }
 

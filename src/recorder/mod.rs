@@ -19,7 +19,7 @@ mod setup;
 mod target;
 mod writer;
 
-pub use choice::SignalChoice;
+pub use choice::{RecordRate, SignalChoice};
 pub use contents::AttachmentInfo;
 pub use decode::{AxisSample, Content, TopicKind};
 pub use event::EventRecord;

@@ -73,10 +73,13 @@ pub const POSE_IN_FRAME: SchemaText = SchemaText {
 const AXIS_DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/axis.fds"));
 
 /// Number of fields of an axis message.
-pub const AXIS_FIELD_COUNT: usize = 23;
+pub const AXIS_FIELD_COUNT: usize = 25;
 
-/// Place of `flags` in [`AXIS_FIELDS`]: the one field that is an integer.
-pub const FLAGS_FIELD: usize = AXIS_FIELD_COUNT - 1;
+/// Place of `flags` in [`AXIS_FIELDS`], which is an integer.
+pub const FLAGS_FIELD: usize = 22;
+
+/// Place of `monitoring` in [`AXIS_FIELDS`], which is an integer.
+pub const MONITORING_FIELD: usize = 24;
 
 /// Fields of `sollwert.Path` in the order of the columns of an export.
 pub const PATH_FIELDS: [&str; 14] = [
@@ -217,4 +220,6 @@ pub const AXIS_FIELDS: [AxisField; AXIS_FIELD_COUNT] = [
     motor_field!("current_mean", "current_mean_a", "A", |_, d| d.current_mean_a),
     motor_field!("voltage", "voltage_v", "V", |_, d| d.voltage_v),
     motor_field!("flags", "flags", "bits", |_, d| f64::from(d.flags)),
+    length_field!("contour_deviation", "", "", Drive, |_, d| d.contour_deviation_lu),
+    motor_field!("monitoring", "monitoring", "bits", |_, d| f64::from(d.monitoring)),
 ];

@@ -112,6 +112,7 @@ impl<'a> RecordingSetup<'a> {
             set("mantissa_bits", bits.to_string());
         }
         set("decimation", self.decimation.to_string());
+        set("record_rate", self.signals.rate().word().to_owned());
         about
     }
 

@@ -197,9 +197,9 @@ impl RecordingWriter {
         channel.next_sequence = channel.next_sequence.wrapping_add(1);
         self.buffer.clear();
         match record {
-            Record::Axis { axis, setpoint, signals, .. } => {
+            Record::Axis { axis, setpoint, signals, due, .. } => {
                 if let Some(encoder) = &self.axis_encoders[*axis] {
-                    encoder.encode(setpoint, signals, &mut self.buffer);
+                    encoder.encode(setpoint, signals, *due, &mut self.buffer);
                 }
             }
             other => self.run_encoder.encode(other, self.time_ns, &mut self.buffer),

@@ -4,6 +4,7 @@ mod closed_forms;
 mod friction;
 mod limits;
 mod linear;
+mod monitoring;
 mod options;
 mod plant;
 mod reference;

@@ -9,9 +9,11 @@ mod corners;
 mod curves;
 mod drives;
 mod figures;
+mod in_position;
 mod limits;
 #[path = "../random/mod.rs"]
 mod random;
+mod rates;
 mod recording;
 mod replay;
 mod text;

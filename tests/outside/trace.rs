@@ -12,6 +12,7 @@ pub struct PathRow {
     pub line: u32,
     pub feed_mm_min: f64,
     pub contour_error_mm: f64,
+    pub limit_kind: String,
 }
 
 /// One event.
@@ -99,6 +100,7 @@ pub fn trace(name: &str, text: &str, words: &[&str]) -> Trace {
                 line: row.line.unwrap(),
                 feed_mm_min: row.feed_mm_min.unwrap(),
                 contour_error_mm: row.contour_error_mm.unwrap_or(0.0),
+                limit_kind: row.limit_kind.clone().unwrap_or_default(),
             }),
             (_, Content::Event(event)) => trace.events.push(EventRow {
                 time_ns,

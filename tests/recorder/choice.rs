@@ -33,6 +33,21 @@ fn words_choose_signals() {
 }
 
 #[test]
+fn a_word_says_how_often() {
+    let machine = machine();
+    let choice = SignalChoice::parse("X.*/10, X.current/3,X.current/7,X.voltage, C.flags / 2", &machine).unwrap();
+    let (x, c) = (AxisId::new(0), AxisId::new(2));
+    let bit = |name: &str| 1_u32 << axis_field(name).unwrap();
+    let all = (1_u32 << AXIS_FIELD_COUNT) - 1;
+    let mut groups = choice.groups(x);
+    groups.sort_unstable();
+    assert_eq!(groups, [(1, bit("voltage")), (3, bit("current")), (10, all & !bit("voltage") & !bit("current"))]);
+    assert_eq!(choice.groups(c), [(2, bit("flags"))]);
+    assert!(SignalChoice::parse("X.current/", &machine).unwrap_err().message.contains("number of samples"));
+    assert!(SignalChoice::parse("X.current/70000", &machine).is_err());
+}
+
+#[test]
 fn a_word_that_names_nothing_is_told_with_the_nearest() {
     let machine = machine();
     let refuse = |text: &str| SignalChoice::parse(text, &machine).unwrap_err();

@@ -34,7 +34,8 @@ fn the_field_table_is_the_proto_file() {
         for (i, (field, declared)) in AXIS_FIELDS.iter().zip(&message.field).enumerate() {
             assert_eq!((declared.name(), declared.number()), (field.name(kind), i as i32 + 1));
             assert!(declared.proto3_optional());
-            assert_eq!(declared.r#type(), if i == schema::FLAGS_FIELD { Type::Uint32 } else { Type::Double });
+            let bits = [schema::FLAGS_FIELD, schema::MONITORING_FIELD].contains(&i);
+            assert_eq!(declared.r#type(), if bits { Type::Uint32 } else { Type::Double });
         }
     }
     let path = descriptor(schema::PATH);
@@ -43,12 +44,12 @@ fn the_field_table_is_the_proto_file() {
 }
 
 #[test]
-fn axis_fields_are_those_of_the_contract() {
+fn axis_fields_are_those_of_the_contract_and_the_view_of_the_control() {
     let names = "position_setpoint_mm position_reference_mm position_actual_mm position_measured_mm control_deviation_mm \
         following_error_mm velocity_setpoint_mm_s acceleration_setpoint_mm_s2 jerk_setpoint_mm_s3 velocity_command_mm_s \
         velocity_feedforward_mm_s velocity_actual_mm_s motor_speed_reference_rad_s motor_speed_rad_s torque_reference_n_m \
         torque_feedforward_n_m friction_torque_n_m gravity_torque_n_m current_reference_a current_a current_mean_a voltage_v \
-        flags";
+        flags contour_deviation_mm monitoring";
     assert!(AXIS_FIELDS.iter().map(|field| field.linear).eq(names.split_whitespace()));
     for field in &AXIS_FIELDS {
         assert_eq!(field.rotary, field.linear.replace("_mm", "_deg"));
@@ -92,6 +93,8 @@ fn every_signal_arrives_in_its_field() {
             current_mean_a: x(20),
             voltage_v: x(21),
             flags: Some(k as u32 % 16),
+            contour_deviation_mm: x(23),
+            monitoring: Some(k as u32 % 32),
         };
         assert_eq!(read, expected, "at {tick:?}");
     }
@@ -158,8 +161,8 @@ fn a_zero_is_written_and_read_back() {
     recorder.axis(Tick(0), AxisId::new(0), &Default::default(), &Default::default());
     recorder.finish("{}").unwrap();
     let message = &seen(&sink.bytes())[0];
-    // 22 doubles of 9 or 10 bytes and the flags: nothing is left out.
-    assert_eq!(message.data.len(), 15 * 9 + 7 * 10 + 3);
+    // 23 doubles of 9 or 10 bytes and two sets of bits: nothing is left out.
+    assert_eq!(message.data.len(), 15 * 9 + 8 * 10 + 2 * 3);
     let recording = Recording::open(&file("zero.mcap", &sink.bytes())).unwrap();
     let Content::Axis(sample) = recording.messages().unwrap().next().unwrap().unwrap().content else { panic!() };
     assert!((0..AXIS_FIELD_COUNT).all(|field| sample.get(field) == Some(0.0)));

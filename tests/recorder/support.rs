@@ -89,6 +89,8 @@ pub fn signals(tick: Tick, axis: AxisId) -> AxisSignals {
         current_mean_a: s(20),
         voltage_v: s(21),
         flags: (tick.0 / POSITION_TICKS % 16) as u32,
+        contour_deviation_lu: s(23),
+        monitoring: (tick.0 / POSITION_TICKS % 32) as u32,
     }
 }
 

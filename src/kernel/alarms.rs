@@ -1,0 +1,72 @@
+//! The alarms of a drive: what its signals say, and what a person reads.
+//!
+//! In: the row of an axis at a position tick. Out: the alarm that ends the run, with the number that the control gives it. A `follow`
+//! runs on: what its drives are given may well be what no control would. Does not stop the axes: a run ends where the alarm stands.
+
+use super::cycle::AxisRow;
+use crate::base::{AxisId, AxisKind, Diagnostic, Tick, units};
+use crate::drive::monitoring;
+use crate::machine::Machine;
+
+/// What the control would stop for, if anything: the first of contour, positioning and standstill monitoring.
+pub(super) fn monitored(machine: &Machine, line: u32, row: &AxisRow) -> Option<Diagnostic> {
+    let AxisRow { tick, axis, signals, .. } = *row;
+    let seen = signals.monitoring & (monitoring::CONTOUR | monitoring::POSITIONING | monitoring::STANDSTILL);
+    let drive = machine.axis(axis).drive.as_ref().filter(|_| seen != 0)?;
+    let name = &machine.axis(axis).name;
+    let unit = if machine.axis(axis).kind == AxisKind::Linear { "um" } else { "deg" };
+    let shown = |value_lu: f64| length(machine.axis(axis).kind, value_lu);
+    let time_s = machine.cycle.time_base.time_s(tick);
+    let away = shown((signals.position_setpoint_lu - signals.position_measured_lu).abs());
+    let (code, message, help) = if seen & monitoring::CONTOUR != 0 {
+        let (off, allowed) = (shown(signals.contour_deviation_lu.abs()), shown(drive.monitoring.contour_lu));
+        let message = format!(
+            "axis {name} at {time_s:.4} s, line {line}: contour monitoring, {off} from where the control's model of the axis is, more than {allowed} \
+             (alarm 25050, MD36400)"
+        );
+        let help = format!(
+            "the drive saturates, sticks or is unstable: see `flags` and `contour_deviation` of the recording; lower the acceleration or \
+             the gains, or give axes.{name}.drive.contour_monitoring_{unit}"
+        );
+        ("D0004", message, help)
+    } else if seen & monitoring::POSITIONING != 0 {
+        let (window, within_s) = (shown(drive.in_position_fine_lu), drive.monitoring.positioning_time_s);
+        let message = format!(
+            "axis {name} at {time_s:.4} s, line {line}: positioning monitoring, still {away} from its set-point and not within {window} after {within_s} s \
+             (alarm 25080, MD36020, MD36010)"
+        );
+        let help = format!(
+            "friction or a load holds it off, or the loop is too weak: see axes.{name}.drive.speed_reset_time_ms, in_position_fine_{unit} \
+             and positioning_time_ms"
+        );
+        ("D0005", message, help)
+    } else {
+        let allowed = shown(drive.monitoring.standstill_lu);
+        let message = format!(
+            "axis {name} at {time_s:.4} s, line {line}: standstill monitoring, {away} from its set-point at rest, more than {allowed} (alarm 25040, MD36030)"
+        );
+        let help =
+            format!("a load moves it, or it swings: see axes.{name}.drive.standstill_{unit} and standstill_delay_ms");
+        ("D0006", message, help)
+    };
+    Some(Diagnostic::error(code, message).help(help))
+}
+
+/// The alarm of a drive whose state is no longer finite.
+pub(super) fn diverged(machine: &Machine, axis: AxisId, tick: Tick) -> Diagnostic {
+    let name = &machine.axis(axis).name;
+    let time_s = machine.cycle.time_base.time_s(tick);
+    Diagnostic::error(
+        "D0001",
+        format!("axis {name} has left all bounds at {time_s:.4} s: its control loop is unstable"),
+    )
+    .help(format!("lower axes.{name}.drive.speed_gain_n_m_s_per_rad, current_gain_v_per_a or position_gain_per_s"))
+}
+
+/// A length of an axis for people.
+fn length(kind: AxisKind, value_lu: f64) -> String {
+    match kind {
+        AxisKind::Linear => format!("{value_lu:.4} mm"),
+        AxisKind::Rotary => format!("{:.4} deg", units::deg_from_rad(value_lu)),
+    }
+}
