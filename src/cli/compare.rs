@@ -7,6 +7,7 @@ use super::compare_tables::tables;
 use super::failure::Failure;
 use super::inputs::{refuse_same_file, refused};
 use super::output::{ProgressLine, print, print_json, show};
+use super::report::signals_of_file;
 use crate::base::{Diagnostic, SourceText};
 use crate::compare::{
     CompareOptions, LimitCheck, check_limits, compare as compare_traces, document, parse_limit, prepare,
@@ -98,9 +99,9 @@ impl Reading {
         Ok(ImportOptions { machine, axis_names, time_column: self.time.clone(), ..ImportOptions::default() })
     }
 
-    /// Reads a trace and shows what the import has to say.
-    pub(super) fn import(&self, path: &Path, machine: Option<&Machine>) -> Result<Trace, Failure> {
-        let options = self.options(machine)?;
+    /// Reads a trace, or only some signals of it, and shows what the import has to say.
+    pub(super) fn import(&self, path: &Path, machine: Option<&Machine>, only: Vec<String>) -> Result<Trace, Failure> {
+        let options = ImportOptions { only, ..self.options(machine)? };
         let mut line = ProgressLine::new();
         line.update(|| format!("reading {}", path.display()));
         let trace = import(path, &options).map_err(Failure::unreadable)?;
@@ -126,8 +127,10 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
         budget: arguments.budget || arguments.output.is_some(),
     };
     let machine = arguments.reading.machine(&files)?;
-    let mut trace = arguments.reading.import(files[0], machine.as_ref())?;
-    let mut reference = arguments.reading.import(files[1], machine.as_ref())?;
+    // Signals that --map names are read whatever else there is.
+    let only = |file| if arguments.maps.is_empty() { signals_of_file(file) } else { Ok(Vec::new()) };
+    let mut trace = arguments.reading.import(files[0], machine.as_ref(), only(files[0])?)?;
+    let mut reference = arguments.reading.import(files[1], machine.as_ref(), only(files[1])?)?;
     prepare(&mut trace);
     prepare(&mut reference);
     let comparison = compare_traces(&trace, &reference, &options).map_err(Failure::unreadable)?;
