@@ -36,7 +36,7 @@ pub(super) fn tables(comparison: &Comparison, checks: &[LimitCheck], trace: &Tra
     text += &pairs_text(&comparison.pairs);
     if !checks.is_empty() {
         let row = |check: &LimitCheck| {
-            let found = check.found.map_or("missing".to_owned(), |found| significant(found));
+            let found = check.found.map_or("missing".to_owned(), significant);
             let verdict = if check.holds() { "holds" } else { "EXCEEDED" };
             vec![check.rule.name.clone(), found, format!("limit {}", check.rule.value), verdict.to_owned()]
         };

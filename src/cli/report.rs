@@ -37,8 +37,7 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<(), Failure> {
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(name).with_extension("html"));
     refuse_same_file([arguments.trace.as_path()], &output)?;
     let machine = arguments.reading.machine(&[&arguments.trace])?;
-    let only =
-        Recording::open(&arguments.trace).map_or_else(|_| Ok(Vec::new()), |recording| signals_that_fit(&recording))?;
+    let only = signals_of_file(&arguments.trace)?;
     let trace = arguments.reading.import(&arguments.trace, machine.as_ref(), only)?;
     let bytes = write(trace, &output)?;
     if arguments.json {

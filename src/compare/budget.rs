@@ -117,21 +117,16 @@ fn programmed(trace: &Trace, machine: Option<&Machine>) -> Result<Programmed, St
     path.points.push((0, path.start_mm));
     let linear = machine.linear_mask();
     loop {
-        match interpreter.next_move() {
-            Ok(Some(next)) => {
-                if path.moves.len() >= MOVES_MAX {
-                    return Err(format!("the program has more than {MOVES_MAX} moves"));
-                }
-                if next.modes.tool.is_some() {
-                    return Err("the program uses tools, whose lengths do not travel in a recording".to_owned());
-                }
-                sample(&mut path, &next, at, &linear, &xyz);
-                at = next.end;
-            }
-            Ok(None) => return Ok(path),
-            // What came before the alarm was executed.
-            Err(_) => return Ok(path),
+        // What came before an alarm was executed.
+        let Ok(Some(next)) = interpreter.next_move() else { return Ok(path) };
+        if path.moves.len() >= MOVES_MAX {
+            return Err(format!("the program has more than {MOVES_MAX} moves"));
         }
+        if next.modes.tool.as_ref().is_some_and(|tool| tool.length.norm() > 0.0) {
+            return Err("the program uses tools with lengths, which do not travel in a recording".to_owned());
+        }
+        sample(&mut path, &next, at, &linear, &xyz);
+        at = next.end;
     }
 }
 

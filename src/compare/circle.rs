@@ -188,7 +188,7 @@ fn judge(
     let radial = |p: &[f64; 2]| p[0].hypot(p[1]) - radius_mm;
     let span = points_mm.iter().map(radial).fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
     let mean_mm = spread_mm.iter().map(radial).sum::<f64>() / spread_mm.len() as f64;
-    let turning: f64 = nominal.windows(3).map(|w| cross(w)).sum();
+    let turning: f64 = nominal.windows(3).map(cross).sum();
     let counter_clockwise = turning > 0.0;
     let figures = CircleFigures {
         plane,
@@ -270,7 +270,9 @@ pub fn fit_circle(points_mm: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
         zz += z;
     }
     let determinant = uu * vv - uv * uv;
-    if !(determinant > 1e-12 * (uu + vv).powi(2)) {
+    // Written so that NaN is none too.
+    let bent = determinant > 1e-12 * (uu + vv).powi(2);
+    if !bent {
         return None;
     }
     let mut c = [0.5 * (uz * vv - vz * uv) / determinant, 0.5 * (vz * uu - uz * uv) / determinant];
@@ -282,7 +284,7 @@ pub fn fit_circle(points_mm: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
         for p in points_mm {
             let d = [p[0] - mean[0] - c[0], p[1] - mean[1] - c[1]];
             let length = d[0].hypot(d[1]);
-            if !(length > 0.0) {
+            if length == 0.0 {
                 continue;
             }
             let row = nalgebra::Vector3::new(d[0] / length, d[1] / length, 1.0);

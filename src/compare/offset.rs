@@ -197,7 +197,7 @@ fn best_shift(a: &Binned, b: &Binned, product: &[f64]) -> Option<(i64, f64)> {
         let of_a = a.energy[to as usize] - a.energy[from as usize];
         let of_b = b.energy[(to + k) as usize] - b.energy[(from + k) as usize];
         let shared = (of_a * of_b).sqrt();
-        if of_a.min(of_b) < least || !(shared > 0.0) {
+        if of_a.min(of_b) < least || shared <= 0.0 {
             return None;
         }
         let c = product[k.rem_euclid(product.len() as i64) as usize];
@@ -262,7 +262,9 @@ fn refine(channels: &[Channel<'_>], coarse: Coarse, drift: bool) -> Alignment {
         found.offset_s += step_s;
         found.drift_ratio += step_ratio;
         found.uncertainty_s = error_s;
-        if !((found.offset_s - coarse.offset_s).abs() <= reach_s) {
+        // Written so that NaN is lost too.
+        let near = (found.offset_s - coarse.offset_s).abs() <= reach_s;
+        if !near {
             return best;
         }
         best = found;
@@ -341,12 +343,14 @@ fn solve(fit: &[Normal], drift: bool) -> Option<(f64, f64, f64)> {
         weight += n.w;
         samples += n.samples;
     }
-    if !(gg > 0.0) || samples < 8 {
+    let moves = gg > 0.0;
+    if !moves || samples < 8 {
         return None;
     }
     let (step_s, step_ratio) = if drift {
         let determinant = gg * ggtt - ggt * ggt;
-        if !(determinant > 1e-12 * gg * ggtt) {
+        let separate = determinant > 1e-12 * gg * ggtt;
+        if !separate {
             return None;
         }
         ((rg * ggtt - rgt * ggt) / determinant, (rgt * gg - rg * ggt) / determinant)
@@ -367,7 +371,8 @@ pub fn residual_delay(channel: &Channel<'_>, at: &Alignment, reach_s: f64) -> Op
         let (step_s, _, error) = solve(&[normal_equations(channel, &found)], false)?;
         found.offset_s += step_s.clamp(-0.5 * reach_s, 0.5 * reach_s);
         error_s = error;
-        if !((found.offset_s - at.offset_s).abs() <= reach_s) {
+        let near = (found.offset_s - at.offset_s).abs() <= reach_s;
+        if !near {
             return None;
         }
         if step_s.abs() < FINE_STEP_S && round > 2 {

@@ -212,8 +212,8 @@ impl<'a> Follower<'a> {
             }
         }
         let from_mm = vertices.get(self.at + 1).map_or(from_mm, |v| v.s_mm);
-        for j in self.at + 1..self.line.segments() {
-            if vertices[j].s_mm - from_mm > reach_mm {
+        for (j, vertex) in vertices.iter().enumerate().take(self.line.segments()).skip(self.at + 1) {
+            if vertex.s_mm - from_mm > reach_mm {
                 break;
             }
             let d = self.line.on_segment(j, point_mm).0;

@@ -10,6 +10,9 @@ use crate::trace::{Signal, TimeGrid, Trace};
 /// Curves of one plot at most: more cannot be told apart.
 const SIGNALS_MAX: usize = 24;
 
+/// Curves of a page at most.
+const CURVES_MAX: usize = 240;
+
 /// One plot.
 #[derive(Debug)]
 pub struct Plot<'a> {
@@ -128,8 +131,8 @@ const HIDDEN: [&str; 8] = [
     "path.jerk_mm_s3",
 ];
 
-/// All plots of a page.
-pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &Comparison)>) -> Vec<Plot<'a>> {
+/// All plots of a page, and how many curves it has no room for.
+pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &Comparison)>) -> (Vec<Plot<'a>>, usize) {
     let mut plots: Vec<Plot<'a>> = Vec::new();
     if let Some((other, comparison)) = reference {
         plots.extend(differences(trace, other, comparison));
@@ -160,8 +163,15 @@ pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &C
         }
     }
     add_budget(&mut plots, side);
+    let mut room = CURVES_MAX;
+    let mut left_out = 0;
+    for plot in &mut plots {
+        left_out += plot.curves.len().saturating_sub(room);
+        plot.curves.truncate(room);
+        room -= plot.curves.len();
+    }
     plots.retain(|plot| !plot.curves.is_empty());
-    plots
+    (plots, left_out)
 }
 
 /// Where the error comes from over time, behind the contour error.

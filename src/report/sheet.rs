@@ -15,7 +15,7 @@ use crate::trace::Trace;
 use serde_json::{Value, json};
 
 /// Bytes of all curves together, before base64 makes four of three.
-const CURVES_BYTES: usize = 1_350_000;
+const CURVES_BYTES: usize = 1_250_000;
 /// Bytes of one curve at least and at most.
 const CURVE_BYTES: (usize, usize) = (2_000, 48_000);
 /// Text of programs in the page.
@@ -133,7 +133,7 @@ impl Sheet<'_> {
         let reference = self.reference;
         let at = reference.and_then(|(_, comparison)| comparison.alignment).unwrap_or_else(Alignment::none);
         let span_s = self.span_s(&at);
-        let plots = plots(self.trace, self.side, reference);
+        let (plots, left_out) = plots(self.trace, self.side, reference);
         let shares: usize = plots.iter().flat_map(|plot| &plot.curves).map(Curve::room_share).sum();
         let room = |curve: &Curve<'_>| {
             let bytes = CURVES_BYTES * curve.room_share() / shares.max(1);
@@ -162,8 +162,9 @@ impl Sheet<'_> {
             "start": span_s.0, "end": span_s.1,
             "plots": plots_json,
             "banded": banded,
-            "limits": if limits.is_empty() { Value::Null } else { limits.json(span_s.1) },
-            "lines": if lines.is_empty() { Value::Null } else { Strip::of_lines(&lines).json(span_s.1) },
+            "left_out": left_out,
+            "limits": if limits.is_empty() { Value::Null } else { limits.json(span_s.1, true) },
+            "lines": if lines.is_empty() { Value::Null } else { Strip::of_lines(&lines).json(span_s.1, false) },
             "path": self.path(&at),
             "programs": self.programs(),
         })

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Runs at most.
-const RUNS_MAX: usize = 20_000;
+const RUNS_MAX: usize = 10_000;
 
 /// Runs of states.
 #[derive(Clone, Debug, Default)]
@@ -110,17 +110,27 @@ impl Strip {
         (thin, true)
     }
 
-    /// For the page.
-    pub fn json(&self, end_s: f64) -> Value {
+    /// For the page: only the names that a run has. `with_durations`: also for how long each holds.
+    pub fn json(&self, end_s: f64, with_durations: bool) -> Value {
         let (runs, thinned) = self.thinned(end_s);
-        let states: Vec<f64> = runs.states.iter().map(|state| *state as f64).collect();
+        let mut used = vec![usize::MAX; self.names.len()];
+        let mut kept: Vec<usize> = Vec::new();
+        for state in &runs.states {
+            if used[*state] == usize::MAX {
+                used[*state] = kept.len();
+                kept.push(*state);
+            }
+        }
+        let states: Vec<usize> = runs.states.iter().map(|state| used[*state]).collect();
+        let durations_s = self.durations_s(end_s);
+        let durations: Vec<f64> = kept.iter().filter(|_| with_durations).map(|state| durations_s[*state]).collect();
         json!({
             "count": runs.states.len(),
             "runs": self.states.len(),
             "thinned": thinned,
             "end": end_s,
-            "names": runs.names,
-            "durations": self.durations_s(end_s),
+            "names": kept.iter().map(|state| self.names[*state].as_str()).collect::<Vec<_>>(),
+            "durations": durations,
             "starts": Steps::covering(runs.starts_s.iter(), 4).pack(&runs.starts_s, Rounding::Nearest),
             "states": {"low": 0.0, "step": 1.0, "bytes": 3, "data": whole(&states)},
         })
@@ -128,7 +138,7 @@ impl Strip {
 }
 
 /// Whole numbers in the code of the page.
-fn whole(states: &[f64]) -> String {
+fn whole(states: &[usize]) -> String {
     let bytes: Vec<u8> =
         states.iter().flat_map(|state| (*state as u32 + 1).to_le_bytes().into_iter().take(3)).collect();
     super::encode::base64(&bytes)

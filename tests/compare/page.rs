@@ -141,6 +141,9 @@ fn a_million_samples_of_many_signals_make_a_page_below_three_megabytes() {
             }));
         }
     }
+    let mut line = signal("path.line", "", &times, |t| (t * 200.0).floor() + 1.0);
+    line.discrete = true;
+    signals.push(line);
     let mut made = trace(signals);
     made.name = "<script>alert(1)<b>".into();
     prepare(&mut made);

@@ -245,6 +245,7 @@ for (const plot of data.plots) makePlot(plot);
   } else {
     words.push("Every sample of every curve is in this page.");
   }
+  if (data.left_out) words.push(`${data.left_out} curves have no room in this page.`);
   words.push("Values are rounded to steps; the legend says the step when you point at it.");
   if (data.path && data.path.count < data.path.samples) words.push(`The path shows ${data.path.count} of ${data.path.samples} points, those with the largest error included.`);
   for (const strip of [limits, lines]) if (strip && strip.thinned) words.push(`Of ${strip.runs} runs of ${strip === limits ? "limits" : "NC lines"} the longest of each ${((data.end - data.start) / strip.count * 1000).toPrecision(3)} ms are here.`);
