@@ -5,9 +5,10 @@
 
 use super::compare_tables::tables;
 use super::failure::Failure;
-use super::inputs::{refuse_same_file, refused};
+use super::inputs::{axis_name, refuse_same_file, refused};
 use super::output::{ProgressLine, print, print_json, show};
 use super::report::signals_of_file;
+use crate::base::units::percent_from_ratio;
 use crate::base::{Diagnostic, SourceText};
 use crate::compare::{
     CompareOptions, LimitCheck, check_limits, compare as compare_traces, document, parse_limit, prepare,
@@ -15,9 +16,10 @@ use crate::compare::{
 use crate::machine::{self, Machine};
 use crate::recorder::Recording;
 use crate::report::{self, Sheet};
-use crate::trace::{ImportOptions, Trace, import};
+use crate::trace::{ImportOptions, Progress, Trace, import};
 use clap::Args;
 use serde_json::json;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 #[derive(Args)]
@@ -87,25 +89,19 @@ impl Reading {
 
     /// Options of the import.
     pub(super) fn options<'a>(&self, machine: Option<&'a Machine>) -> Result<ImportOptions<'a>, Failure> {
-        let axis_name = |text: &String| {
-            let parts =
-                text.split_once('=').and_then(|(n, name)| Some((n.trim().parse().ok()?, name.trim().to_owned())));
-            parts.filter(|(_, name)| !name.is_empty()).ok_or_else(|| {
-                let finding = Diagnostic::error("T0110", format!("`--axis-name {text}` is not NUMBER=NAME"));
-                Failure::unreadable(finding.help("write the number of the machine axis and its name, such as 7=A"))
-            })
-        };
-        let axis_names = self.axis_names.iter().map(axis_name).collect::<Result<_, _>>()?;
+        let axis_names = self.axis_names.iter().map(|text| axis_name(text)).collect::<Result<_, _>>()?;
         Ok(ImportOptions { machine, axis_names, time_column: self.time.clone(), ..ImportOptions::default() })
     }
 
     /// Reads a trace, or only some signals of it, and shows what the import has to say.
     pub(super) fn import(&self, path: &Path, machine: Option<&Machine>, only: Vec<String>) -> Result<Trace, Failure> {
-        let options = ImportOptions { only, ..self.options(machine)? };
-        let mut line = ProgressLine::new();
-        line.update(|| format!("reading {}", path.display()));
+        let line = RefCell::new(ProgressLine::new());
+        let tell = |done: u64, total: u64| {
+            let share_percent = percent_from_ratio(done as f64 / total.max(1) as f64);
+            line.borrow_mut().update(|| format!("{}: {share_percent:.0} % read", path.display()));
+        };
+        let options = ImportOptions { only, progress: Progress(Some(&tell)), ..self.options(machine)? };
         let trace = import(path, &options).map_err(Failure::unreadable)?;
-        drop(line);
         show(&trace.notes);
         Ok(trace)
     }

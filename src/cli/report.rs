@@ -2,9 +2,8 @@
 //!
 //! In: a trace of any known format. Out: one HTML file that needs nothing else. Does not compute figures.
 
-use super::compare::Reading;
 use super::failure::Failure;
-use super::inputs::refuse_same_file;
+use super::inputs::{TraceReading, refuse_same_file};
 use super::output::{print, print_json, show};
 use crate::base::Diagnostic;
 use crate::compare::{examine, prepare};
@@ -23,7 +22,7 @@ pub(super) struct ReportArguments {
     /// Trace: a recording, or what a control exported
     trace: PathBuf,
     #[command(flatten)]
-    reading: Reading,
+    reading: TraceReading,
     /// Page to write; default: the name of the trace with .html, in the current folder
     #[arg(short, long, value_name = "REPORT.html")]
     output: Option<PathBuf>,
@@ -36,9 +35,11 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<(), Failure> {
     let name = arguments.trace.file_name().unwrap_or_else(|| "report".as_ref());
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(name).with_extension("html"));
     refuse_same_file([arguments.trace.as_path()], &output)?;
-    let machine = arguments.reading.machine(&[&arguments.trace])?;
     let only = signals_of_file(&arguments.trace)?;
-    let trace = arguments.reading.import(&arguments.trace, machine.as_ref(), only)?;
+    let trace = arguments
+        .reading
+        .with_options(&only, |options| import(&arguments.trace, options).map_err(Failure::unreadable))?;
+    show(&trace.notes);
     let bytes = write(trace, &output)?;
     if arguments.json {
         return print_json(&json!({"format": 1, "output": output.display().to_string(), "bytes": bytes}));

@@ -7,7 +7,7 @@
 //! the last row is the end posture at rest, on the first tick at or after the end of the last law.
 //!
 //! Where drives are simulated ([`Interpolator::waiting_in_position`]) a block that ends in an exact stop (G60, G9 with G601 or G602), or in front of a
-//! block that rests the path (G4, M0, M6, STOPRE), ends when it is told so ([`Interpolator::release`]): until then its last set-point stands, and the
+//! block that rests the path (G4, M0, M6, STOPRE), or that waits for axes on their own way (POS, WAITP), ends when it is told so ([`Interpolator::release`]): until then its last set-point stands, and the
 //! next piece begins on a tick. The end of the program is not waited for under the continuous modes.
 //! Does not plan, does not know what events mean, nor where the axes are.
 
@@ -134,9 +134,11 @@ impl Interpolator {
     /// What the set-point that was sampled last waits for, if it stands at a block end that waits.
     pub fn exact_stop_wait(&self) -> Option<ExactStopWait> {
         let (hold, active) = (self.hold.filter(|hold| hold.released_k.is_none())?, self.active.as_ref()?);
+        let contour = &active.piece.path.contour;
+        let positions = matches!(contour.kind, PieceKind::WaitPositioned { .. });
         Some(ExactStopWait {
             since: self.time_base.setpoint_tick(hold.since_k),
-            window: active.piece.path.contour.modes.exact_stop,
+            window: if positions { ExactStop::Fine } else { contour.modes.exact_stop },
             elsewhere: self.overlay.under_way(),
         })
     }
@@ -225,6 +227,10 @@ impl Interpolator {
         let Some(contour) = self.active.as_ref().filter(|_| self.waits).map(|active| &active.piece.path.contour) else {
             return false;
         };
+        let ends = |event: &Event| matches!(event, Event::MFunction(2 | 17 | 30));
+        if matches!(contour.kind, PieceKind::WaitPositioned { .. }) {
+            return !contour.events.iter().any(ends);
+        }
         let moves = contour.curve().is_some_and(|curve| curve.length_lu() > 0.0);
         if !contour.stop_at_end || !moves || contour.modes.exact_stop == ExactStop::Setpoint {
             return false;
@@ -235,7 +241,12 @@ impl Interpolator {
         if self.next.is_none() {
             self.next = next();
         }
-        self.next.as_ref().is_some_and(rests_the_path)
+        let rests = |piece: &PlannedPiece| {
+            // M0, M6, G4, STOPRE: for these the axes must be where they should be. The program may end before they are.
+            let contour = &piece.path.contour;
+            matches!(contour.kind, PieceKind::Wait { .. }) && !contour.events.iter().any(ends)
+        };
+        self.next.as_ref().is_some_and(rests)
     }
 
     /// The end of the active piece, while the axes are waited for.
@@ -361,13 +372,6 @@ impl Active {
         let position_lu = if stopped { reached_lu } else { self.length_lu };
         PathState { position_lu, velocity_lu_s: 0.0, acceleration_lu_s2: 0.0, jerk_lu_s3: 0.0, limit }
     }
-}
-
-/// M0, M6, G4, STOPRE: for these the axes must be where they should be. The program may end before they are.
-fn rests_the_path(piece: &PlannedPiece) -> bool {
-    let contour = &piece.path.contour;
-    let ends = |event: &Event| matches!(event, Event::MFunction(2 | 17 | 30));
-    matches!(contour.kind, PieceKind::Wait { .. }) && !contour.events.iter().any(ends)
 }
 
 /// A wait of 0 s: a function block.

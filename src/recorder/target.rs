@@ -21,7 +21,7 @@ pub(crate) struct Target {
 
 impl Target {
     /// Creates or empties a file.
-    pub(super) fn file(path: &Path) -> io::Result<Self> {
+    pub(crate) fn file(path: &Path) -> io::Result<Self> {
         let file = File::create(path)?;
         let regular = file.metadata()?.is_file();
         let handle = if regular { Some(file.try_clone()?) } else { None };
@@ -29,17 +29,17 @@ impl Target {
     }
 
     /// Takes any writer.
-    pub(super) fn writer(writer: impl Write + Send + 'static) -> Self {
+    pub(crate) fn writer(writer: impl Write + Send + 'static) -> Self {
         Self { sink: BufWriter::with_capacity(BUFFER_BYTES, Box::new(writer)), file: None, bytes: 0 }
     }
 
     /// Bytes so far.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
 
     /// Pushes everything out and waits for the disk: some disks report only then that they are full.
-    pub(super) fn complete(&mut self) -> io::Result<()> {
+    pub(crate) fn complete(&mut self) -> io::Result<()> {
         self.sink.flush()?;
         self.file.as_ref().map_or(Ok(()), File::sync_all)
     }
