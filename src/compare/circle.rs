@@ -70,12 +70,23 @@ const ROUND_SHARE: f64 = 2e-3;
 /// Circles are the same within this.
 const SAME_MM: f64 = 0.2;
 
-/// All full circles of a line. `matches[k]`: where actual point k belongs.
-pub fn circles(heading: &Heading, line_time_s: &dyn Fn(f64) -> f64, matches: &[Option<Match>]) -> Vec<CircleFigures> {
+/// What circles are judged by: actual points, where each belongs, and when the set-points are where.
+#[derive(Clone, Copy)]
+pub struct Actual<'a> {
+    /// Points of the tool, `[n]`.
+    pub points_mm: &'a [[f64; 3]],
+    /// Where each belongs on the line, `[n]`.
+    pub matches: &'a [Option<Match>],
+    /// Time of a place of the line.
+    pub line_time_s: &'a dyn Fn(f64) -> f64,
+}
+
+/// All full circles of a line.
+pub fn circles(heading: &Heading, actual: &Actual<'_>) -> Vec<CircleFigures> {
     let mut rounds: Vec<Round> = Vec::new();
     for (axes, plane) in PLANES {
         for (from, to) in runs(heading, axes) {
-            rounds.extend(judge(heading, axes, plane, from..to, line_time_s, matches));
+            rounds.extend(judge(heading, axes, plane, from..to, actual));
         }
     }
     rounds.sort_by(|a, b| a.figures.start_s.total_cmp(&b.figures.start_s));
@@ -128,9 +139,10 @@ fn runs(heading: &Heading, axes: [usize; 2]) -> Vec<(usize, usize)> {
     let (mut start, mut turned, mut steps, mut last): (usize, f64, f64, Option<f64>) = (half, 0.0, 0.0, None);
     let mut close = |start: usize, end: usize, turned: f64| {
         // The window shortens a run at both ends by half of itself: that much of the circle lies outside.
+        let end = end.max(start);
         let mean = turned.abs() / (end - start).max(1) as f64;
         if turned.abs() + 2.0 * half as f64 * mean >= TURN_MIN_RAD {
-            found.push((start - half, (end + half).min(n)));
+            found.push((start, end));
         }
     };
     for i in (half..n - half).step_by(stride) {
@@ -146,7 +158,7 @@ fn runs(heading: &Heading, axes: [usize; 2]) -> Vec<(usize, usize)> {
             turned += step_rad;
             steps += 1.0;
         } else {
-            close(start, i, turned);
+            close(start, i - stride, turned);
             (start, turned, steps) = (i, 0.0, 0.0);
         }
     }
@@ -163,8 +175,7 @@ fn judge(
     axes: [usize; 2],
     plane: [&'static str; 2],
     run: std::ops::Range<usize>,
-    line_time_s: &dyn Fn(f64) -> f64,
-    matches: &[Option<Match>],
+    actual: &Actual<'_>,
 ) -> Option<Round> {
     let nominal: Vec<[f64; 2]> = heading.points_mm[run.clone()].iter().map(|p| [p[axes[0]], p[axes[1]]]).collect();
     let (centre, radius_mm) = fit_circle(&nominal)?;
@@ -173,17 +184,13 @@ fn judge(
     }
     let way = |i: usize| i as f64 * heading.step_mm;
     let (from_mm, to_mm) = (way(run.start), way(run.end));
-    let inside = |m: &&Match| m.s_mm >= from_mm && m.s_mm <= to_mm;
-    let place = |m: &Match| -> [f64; 2] {
-        let i = ((m.s_mm / heading.step_mm) as usize).min(heading.points_mm.len().saturating_sub(2));
-        let share = m.s_mm / heading.step_mm - i as f64;
-        std::array::from_fn(|k| {
-            let (p, q) = (heading.points_mm[i][axes[k]], heading.points_mm[i + 1][axes[k]]);
-            p + share * (q - p) + m.error_mm[axes[k]] - centre[k]
-        })
-    };
-    let points_mm: Vec<[f64; 2]> = matches.iter().flatten().filter(inside).map(place).collect();
-    let spread_mm = spread(matches.iter().flatten().filter(inside), &points_mm, radius_mm);
+    let inside = |m: &Match| m.s_mm >= from_mm && m.s_mm <= to_mm;
+    let place =
+        |(k, _): (usize, &Match)| -> [f64; 2] { std::array::from_fn(|i| actual.points_mm[k][axes[i]] - centre[i]) };
+    let on_circle =
+        || actual.matches.iter().enumerate().filter_map(|(k, m)| Some((k, m.as_ref()?))).filter(|(_, m)| inside(m));
+    let points_mm: Vec<[f64; 2]> = on_circle().map(place).collect();
+    let spread_mm = spread(on_circle().map(|(_, m)| m), &points_mm, radius_mm);
     let (actual_centre, _) = fit_circle(&spread_mm)?;
     let radial = |p: &[f64; 2]| p[0].hypot(p[1]) - radius_mm;
     let span = points_mm.iter().map(radial).fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
@@ -195,8 +202,8 @@ fn judge(
         centre_mm: centre,
         radius_mm,
         counter_clockwise,
-        start_s: line_time_s(from_mm),
-        end_s: line_time_s(to_mm),
+        start_s: (actual.line_time_s)(from_mm),
+        end_s: (actual.line_time_s)(to_mm),
         deviation_um: um(ring(&points_mm, actual_centre)),
         radial_max_um: um(span.1),
         radial_min_um: um(span.0),

@@ -270,7 +270,7 @@ pub(super) fn own_contour_of(
 ) -> Option<OwnContour> {
     let line = commanded.line(None);
     let contour = contour(actual, &line, &commanded.line(Some(plane)), start_s, plane)?;
-    let features = features(&line, &contour.matches);
+    let features = features(&line, actual, &contour.matches);
     let against = format!("{} against {}{whose}", actual.stem, commanded.stem);
     Some(OwnContour { against, contour, features, track: actual.clone() })
 }

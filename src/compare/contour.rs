@@ -4,7 +4,7 @@
 //! distance of a sample is that to the nearest point on the segments of the line (chord error of the line's samples: v² T² / 8 R).
 //! Samples beyond the ends of the line, and in gaps, do not count. Does not compare in time: a pure lag along the path is no error here.
 
-use super::circle::{CircleFigures, circles};
+use super::circle::{Actual, CircleFigures, circles};
 use super::corner::{CornerFigures, corners};
 use super::geometry::{Track, flat};
 use super::heading::Heading;
@@ -74,12 +74,13 @@ pub struct Features {
 }
 
 /// Finds circles and corners. `matches`: of the track against this line.
-pub fn features(line: &Line, matches: &[Option<Match>]) -> Features {
+pub fn features(line: &Line, track: &Track, matches: &[Option<Match>]) -> Features {
     let heading = Heading::new(line);
     let times: Vec<(f64, f64)> = line.vertices().map(|(s_mm, _, time_s)| (s_mm, time_s)).collect();
     let time_s = |s_mm: f64| {
         let i = times.partition_point(|(s, _)| *s <= s_mm).saturating_sub(1);
         times.get(i).map_or(f64::NAN, |(_, time_s)| *time_s)
     };
-    Features { circles: circles(&heading, &time_s, matches), corners: corners(&heading, &time_s, matches) }
+    let actual = Actual { points_mm: &track.points_mm, matches, line_time_s: &time_s };
+    Features { circles: circles(&heading, &actual), corners: corners(&heading, &time_s, matches) }
 }
