@@ -64,7 +64,9 @@ fn the_circular_deviation_of_an_ellipse_is_twice_its_amplitude() {
     let a = moved(0.001, 5000, |t| on_circle(radius_mm, round(t)), |t, _| oval(t));
     let own = examine(&a, None).expect("figures").own.expect("a contour");
     let circle = &own.features.circles[0];
-    assert!((circle.deviation_um - 40.0).abs() < 0.2, "{circle:?}");
+    // The window that finds the circle leaves out 2 degrees on either side of its start, the place of the largest radius: that moves the
+    // least-squares centre by 0.02 mm * 2 sin(2 deg) / pi = 0.45 um, and the width of the ring by as much.
+    assert!((circle.deviation_um - 40.0).abs() < 0.7, "{circle:?}");
     assert!((circle.radial_max_um - 20.0).abs() < 0.1 && (circle.radial_min_um + 20.0).abs() < 0.1, "{circle:?}");
     assert!(circle.bidirectional_um.is_none());
 }

@@ -143,7 +143,7 @@ try {
   check((await page.evaluate("state.to - state.from - (data.end - data.start)")) === 0, "the button shows the whole time again");
 
   // The path is drawn, in every colour and view.
-  const painted = `(() => { const c = document.getElementById("path"), d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data; let n = 0; for (let i = 3; i < d.length; i += 4) n += d[i] > 0; return n; })()`;
+  const painted = `(() => { const c = document.getElementById("path"), copy = new OffscreenCanvas(c.width, c.height).getContext("2d", { willReadFrequently: true }); copy.drawImage(c, 0, 0); const d = copy.getImageData(0, 0, c.width, c.height).data; let n = 0; for (let i = 3; i < d.length; i += 4) n += d[i] > 0; return n; })()`;
   for (const view of ["3d", "xy", "zx", "yz"]) for (const colour of ["feed", "error", "limit"]) {
     await page.evaluate(`document.querySelector('#views [data-view="${view}"]').click(); (() => { const c = document.getElementById("colour"); c.value = "${colour}"; c.dispatchEvent(new Event("change")); })()`);
     const pixels = await page.evaluate(painted);
