@@ -230,13 +230,14 @@ fn pairs_text(pairs: &[PairFigures]) -> String {
     if pairs.is_empty() {
         return String::new();
     }
-    let row = |pair: &PairFigures| {
+    let mut text = "\npairs\n".to_owned();
+    for pair in pairs {
         let zero = if pair.zero == 0.0 {
             String::new()
         } else {
             format!("; zeros differ: {} {} taken off", significant(pair.zero), pair.unit)
         };
-        vec![pair.name.clone(), format!("{}: {}{zero}", pair.reference_name, pair.reason)]
-    };
-    format!("\npairs\n{}", table(&pairs.iter().map(row).collect::<Vec<_>>()))
+        text += &format!("  {} = {}: {}{zero}\n", pair.name, pair.reference_name, pair.reason);
+    }
+    text
 }

@@ -182,6 +182,8 @@ fn judge(
     if ring(&nominal, centre) > (ROUND_SHARE * radius_mm).max(0.01) {
         return None;
     }
+    let turning: f64 = nominal.windows(3).map(cross).sum();
+    let run = extended(heading, axes, &run, (centre, radius_mm), turning.signum());
     let way = |i: usize| i as f64 * heading.step_mm;
     let (from_mm, to_mm) = (way(run.start), way(run.end));
     let inside = |m: &Match| m.s_mm >= from_mm && m.s_mm <= to_mm;
@@ -195,7 +197,6 @@ fn judge(
     let radial = |p: &[f64; 2]| p[0].hypot(p[1]) - radius_mm;
     let span = points_mm.iter().map(radial).fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
     let mean_mm = spread_mm.iter().map(radial).sum::<f64>() / spread_mm.len() as f64;
-    let turning: f64 = nominal.windows(3).map(cross).sum();
     let counter_clockwise = turning > 0.0;
     let figures = CircleFigures {
         plane,
@@ -214,6 +215,36 @@ fn judge(
         }),
     };
     Some(Round { figures, points_mm, spread_mm })
+}
+
+/// A run with what the window left out at its ends: as far as the line stays on the circle and goes on in its direction.
+fn extended(
+    heading: &Heading,
+    axes: [usize; 2],
+    run: &std::ops::Range<usize>,
+    (centre, radius_mm): ([f64; 2], f64),
+    sign: f64,
+) -> std::ops::Range<usize> {
+    let most = (3.0 * WINDOW_MM / heading.step_mm).ceil() as usize;
+    let slack_mm = (1e-4 * radius_mm).max(2e-4);
+    let from_centre = |i: usize| heading.points_mm.get(i).map(|p| [p[axes[0]] - centre[0], p[axes[1]] - centre[1]]);
+    // Whether point `to` lies on the circle and ahead of point `from`.
+    let goes_on = |from: usize, to: usize| {
+        let Some((a, b)) = from_centre(from).zip(from_centre(to)) else { return false };
+        (b[0].hypot(b[1]) - radius_mm).abs() <= slack_mm && sign * (a[0] * b[1] - a[1] * b[0]) > 0.0
+    };
+    let (mut start, mut end) = (run.start, run.end);
+    for _ in 0..most {
+        // Backwards: the point before must see the run's first one ahead of it.
+        let on = start > 0 && from_centre(start - 1).is_some_and(|p| (p[0].hypot(p[1]) - radius_mm).abs() <= slack_mm);
+        if on && goes_on(start - 1, start) {
+            start -= 1;
+        }
+        if goes_on(end, end + 1) {
+            end += 1;
+        }
+    }
+    start..end
 }
 
 /// Of the points those that are half a degree of way apart.

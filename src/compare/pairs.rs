@@ -70,7 +70,7 @@ fn reason(a: &Signal, b: &Signal) -> String {
     };
     let mut words = vec!["same signal".to_owned()];
     words.extend(from(a));
-    words.extend(from(b));
+    words.extend(from(b).filter(|_| a.original != b.original));
     words.join("; ")
 }
 

@@ -235,14 +235,17 @@ fn differences<'a>(trace: &'a Trace, reference: &'a Trace, comparison: &Comparis
     let mut plots = Vec::new();
     for pair in &comparison.pairs {
         let (Some(a), Some(b)) = (trace.signal(&pair.name), reference.signal(&pair.reference_name)) else { continue };
+        // What says nearly the same as another is in the table.
+        if a.axis_signal().is_some_and(|own| HIDDEN.contains(&own.stem())) {
+            continue;
+        }
         let (one, mut other) = (Series::of(a), Series::of(b).cursor());
         let difference = |i: usize| one.values[i] - other.value(at.reference_s(one.time_s(i))) - pair.zero;
         let values: Vec<f64> = (0..one.len()).map(difference).collect();
         let family = a.axis_signal().map_or_else(|| pair.name.clone(), |own| own.axis.to_owned());
-        let shown = plots.len() < 4;
         let made = Samples::Made { times: a.times.clone(), values };
         let name = format!("Δ {}", pair.name);
-        let curve = Curve { name, family, dashed: false, shown, of_reference: false, samples: made };
+        let curve = Curve { name, family, dashed: false, shown: true, of_reference: false, samples: made };
         let title = match a.axis_signal() {
             Some(own) => format!("Difference of {}", own.stem().replace('_', " ")),
             None => "Difference".to_owned(),
