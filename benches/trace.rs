@@ -4,7 +4,6 @@
 #[allow(dead_code)]
 #[path = "../tests/trace/operate_session.rs"]
 mod operate_session;
-#[allow(dead_code)]
 #[path = "../tests/random/mod.rs"]
 mod random;
 #[allow(dead_code)]

@@ -64,15 +64,8 @@ pub(super) struct TraceReading {
     /// Machine file or shipped machine: names and kinds of the axes behind the numbers in the trace
     #[arg(short, long, value_name = "MACHINE")]
     machine: Option<String>,
-    /// Name of a machine axis by its number in the trace, such as 7=A; may be given several times
-    #[arg(long = "axis-name", value_name = "NUMBER=NAME")]
-    axis_names: Vec<String>,
-    /// Which of our signals a signal of the trace is, such as "ENC2_POS=position_actual"; may be given several times
-    #[arg(long = "map", value_name = "CONTROLLER=OURS")]
-    signal_map: Vec<String>,
-    /// The time column of a CSV
-    #[arg(long = "time", value_name = "NAME")]
-    time_column: Option<String>,
+    #[command(flatten)]
+    names: TraceNames,
 }
 
 impl TraceReading {
@@ -86,13 +79,39 @@ impl TraceReading {
             Some(name) => Some(load(name, &[]).map_err(refused)?),
             None => None,
         };
+        self.names.with_options(loaded.as_ref().map(|loaded| &loaded.machine), only, act)
+    }
+}
+
+/// What the names in a trace mean.
+#[derive(Args)]
+pub(super) struct TraceNames {
+    /// Name of a machine axis by its number in the trace, such as 7=A; may be given several times
+    #[arg(long = "axis-name", value_name = "NUMBER=NAME")]
+    axis_names: Vec<String>,
+    /// Which of our signals a signal of the trace is, such as "ENC2_POS=position_actual"; may be given several times
+    #[arg(long = "map", value_name = "CONTROLLER=OURS")]
+    signal_map: Vec<String>,
+    /// The time column of a CSV: NAME, NAME:SECONDS (what one of its units is), or the distance of the rows in s
+    #[arg(long = "time", value_name = "NAME")]
+    time_column: Option<String>,
+}
+
+impl TraceNames {
+    /// Calls `act` with the options; progress is shown while it works.
+    pub(super) fn with_options<T>(
+        &self,
+        machine: Option<&Machine>,
+        only: &[String],
+        act: impl FnOnce(&ImportOptions) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
         let progress = RefCell::new(ProgressLine::new());
         let tell = |done: u64, total: u64| {
             let share_percent = percent_from_ratio(done as f64 / total.max(1) as f64);
             progress.borrow_mut().update(|| format!("{share_percent:.0} % read"));
         };
         act(&ImportOptions {
-            machine: loaded.as_ref().map(|loaded| &loaded.machine),
+            machine,
             axis_names: self.axis_names.iter().map(|text| axis_name(text)).collect::<Result<_, _>>()?,
             signal_map: self.signal_map.iter().map(|text| map_row(text)).collect::<Result<_, _>>()?,
             time_column: self.time_column.clone(),

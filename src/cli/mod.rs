@@ -3,6 +3,8 @@
 //! In: command line. Out: tables or one JSON document on stdout, findings and progress on stderr, exit code 0 (done), 1 (the work
 //! found something wrong) or 2 (wrong usage, unreadable input, output that cannot be written). No physics here.
 
+mod bode;
+mod bode_page;
 mod check;
 mod compare;
 mod compare_tables;
@@ -66,7 +68,7 @@ enum Command {
     Export(export::ExportArguments),
     /// Rescue what an interrupted run left
     Recover(recover::RecoverArguments),
-    /// Machine files: check, list, show, schema
+    /// Machine files: check, list, show, schema, frequency responses
     Machine(machine::MachineArguments),
     /// What a code such as E0104 means, and what to do
     Explain(explain::ExplainArguments),

@@ -6,6 +6,7 @@
 
 use super::import::{About, ImportOptions, import, read_rows};
 use super::operate_writer::write_operate;
+use super::recording::TRACE_METADATA;
 use super::rows::{stream_recording, stream_trace};
 use super::sink::{Head, Sink};
 use super::source::Source;
@@ -113,7 +114,7 @@ pub fn export_trace(
         let message = format!("{} is a recording already", source.shown);
         return Err(Diagnostic::error("T0020", message).help("export it to .csv, .parquet or .xml"));
     }
-    if from_recording && form == ExportForm::Csv && everything {
+    if from_recording && form == ExportForm::Csv && everything && is_simulated(&Recording::open(input)?) {
         // The recorder's own table: text, faster.
         let report = crate::recorder::export(&Recording::open(input)?, output)?;
         let written = Written { rows: report.rows, columns: report.columns, bytes: report.bytes };
@@ -129,6 +130,11 @@ pub fn export_trace(
     };
     outcome.written.bytes = file.commit(target)?;
     Ok(outcome)
+}
+
+/// A recording of a run, not of an imported trace.
+fn is_simulated(recording: &Recording) -> bool {
+    recording.metadata(TRACE_METADATA).is_none()
 }
 
 fn recording_origin() -> Origin {

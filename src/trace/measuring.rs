@@ -6,8 +6,7 @@
 
 use super::import::{About, ImportOptions};
 use super::sink::{Head, Layout, Sink};
-use super::source::Source;
-use super::text::TOO_LONG;
+use super::source::{Source, unreadable};
 use super::wire::{Meaning, Origin, TraceFormat};
 use crate::base::Diagnostic;
 use quick_xml::Reader;
@@ -144,9 +143,8 @@ impl Walk<'_> {
                 }
                 Ok(Event::Eof) => return Ok(self.path.is_empty()),
                 Ok(_) => {}
-                Err(error) if error.to_string().contains(TOO_LONG) => {
-                    let message = format!("{} has {TOO_LONG}", self.source.part_name(self.part));
-                    return Err(self.at(Diagnostic::error("T0005", message), at));
+                Err(quick_xml::Error::Io(error)) => {
+                    return Err(self.at(unreadable(self.source.part_name(self.part), &error), at));
                 }
                 Err(_) if !self.arrays.is_empty() => return Ok(false),
                 Err(error) => {

@@ -9,8 +9,7 @@ use super::instants::instant_s;
 use super::naming::{NamedHead, Naming, operate_name};
 use super::operate_frame::{Declared, Frame};
 use super::sink::{Layout, Memory, Sink};
-use super::source::{PartReader, Source};
-use super::text::TOO_LONG;
+use super::source::{PartReader, Source, unreadable};
 use super::wire::{Clock, Origin, TraceFormat};
 use crate::base::Diagnostic;
 use quick_xml::Reader;
@@ -113,7 +112,7 @@ impl<'s, 'o> Session<'s, 'o> {
                 Ok(Event::Eof) => break,
                 Ok(_) => {}
                 Err(error) => {
-                    if self.stops(&mut reader, at, &error.to_string())? {
+                    if self.stops(&mut reader, at, &error)? {
                         break;
                     }
                 }
@@ -124,16 +123,20 @@ impl<'s, 'o> Session<'s, 'o> {
     }
 
     /// A fault of the XML: at the end of the file after some records the trace is cut off, elsewhere it is an error.
-    fn stops(&mut self, reader: &mut Reader<PartReader>, at: u64, reason: &str) -> Result<bool, Diagnostic> {
-        if reason.contains(TOO_LONG) {
-            let message = format!("{} has {TOO_LONG}", self.source.part_name(self.part));
-            return Err(self.at(Diagnostic::error("T0005", message), at, "it begins here"));
+    fn stops(
+        &mut self,
+        reader: &mut Reader<PartReader>,
+        at: u64,
+        error: &quick_xml::Error,
+    ) -> Result<bool, Diagnostic> {
+        if let quick_xml::Error::Io(error) = error {
+            return Err(self.at(unreadable(self.source.part_name(self.part), error), at, "here"));
         }
         let at_end = std::io::BufRead::fill_buf(reader.get_mut()).is_ok_and(|left| left.is_empty());
         if at_end && self.rows > 0 {
             return Ok(true);
         }
-        let message = format!("{} is not well-formed XML: {reason}", self.source.part_name(self.part));
+        let message = format!("{} is not well-formed XML: {error}", self.source.part_name(self.part));
         let finding = Diagnostic::error("T0004", message).help("export the trace again; a copy may have been cut off");
         Err(self.at(finding, at, "here"))
     }

@@ -80,6 +80,7 @@ pub(super) struct Told {
     unit: String,
     clock: String,
     discrete: bool,
+    words: bool,
     delay_s: f64,
     encoder_zero: bool,
     remark: String,
@@ -98,6 +99,7 @@ impl Told {
             unit: head.unit.clone(),
             clock: clock.to_owned(),
             discrete: head.discrete,
+            words: head.words,
             delay_s: head.meaning.delay_s,
             encoder_zero: head.meaning.zero == Zero::Encoder,
             remark: head.meaning.remark.clone(),
@@ -207,8 +209,8 @@ impl Track {
     fn push_sample(&mut self, time_ns: u64, sample: &Sample) {
         if self.push_time(time_ns) {
             for column in &mut self.columns {
-                let word = sample.text.as_deref().map(|text| column.labels.place(text) as f64);
-                column.values.push(sample.value.or(word).unwrap_or(f64::NAN));
+                let value = sample_value(sample, &mut column.labels);
+                column.values.push(value);
             }
         }
     }
@@ -324,6 +326,24 @@ pub(super) fn path_value(path: &PathMessage, field: usize, labels: &mut Labels) 
     }
 }
 
+/// A number, or a word by its place among `labels`.
+pub(super) fn sample_value(sample: &Sample, labels: &mut Labels) -> f64 {
+    let word = sample.text.as_deref().map(|text| labels.place(text) as f64);
+    sample.value.or(word).unwrap_or(f64::NAN)
+}
+
+/// Heads get back what the recording kept of an imported trace.
+pub(super) fn retold_heads(recording: &Recording, heads: &mut [Head]) {
+    let Some(record) = recording.metadata(TRACE_METADATA) else { return };
+    for head in heads {
+        let told = record.get(&head.original).and_then(|text| serde_json::from_str::<Told>(text).ok());
+        if let Some(told) = told {
+            head.words = told.words;
+            (head.name, head.original, head.unit) = (told.name, told.original, told.unit);
+        }
+    }
+}
+
 /// Heads of the fields of a topic.
 pub(super) fn field_heads(kind: &TopicKind, fields: &[usize]) -> Vec<Head> {
     match kind {
@@ -331,6 +351,9 @@ pub(super) fn field_heads(kind: &TopicKind, fields: &[usize]) -> Vec<Head> {
             fields.iter().map(|field| Column::of_axis(name, *kind, *field).head()).collect()
         }
         TopicKind::Path => (0..PATH_FIELDS.len()).map(|field| Column::of_path(field).head()).collect(),
+        TopicKind::Signal { original } => {
+            vec![Head { layout: Layout::Own, name: None, ..Column::of_sample(original).head() }]
+        }
         _ => Vec::new(),
     }
 }

@@ -3,13 +3,12 @@
 //! In: a [`Recording`], streamed; a [`Trace`] in memory. Out: heads and rows in order of time. Does not resample: a signal has a value
 //! only in rows of its own instants, and is held between them where that is what it means.
 
+use super::recording::{Labels, field_heads, path_value, retold_heads, sample_value};
 use super::sink::{Head, Layout, Sink};
 use super::wire::{Clock, Trace};
 use crate::base::Diagnostic;
 use crate::base::units::NS_PER_S;
 use crate::recorder::{Content, Message, Recording, TopicKind};
-
-use super::recording::{Labels, field_heads, path_value};
 
 /// Streams a recording: axes and path are held, one row an instant.
 pub(super) fn stream_recording(recording: &Recording, sink: &mut dyn Sink) -> Result<(), Diagnostic> {
@@ -22,6 +21,7 @@ pub(super) fn stream_recording(recording: &Recording, sink: &mut dyn Sink) -> Re
             heads.extend(fields);
         }
     }
+    retold_heads(recording, &mut heads);
     if heads.is_empty() {
         let message = format!("{} holds neither axes nor a path", recording.path().display());
         return Err(Diagnostic::error("R0018", message).help("only recordings of sollwert can be exported"));
@@ -41,6 +41,14 @@ pub(super) fn stream_recording(recording: &Recording, sink: &mut dyn Sink) -> Re
             (Content::Axis(sample), TopicKind::Axis { .. }) => {
                 let fields = recording.topics()[topic].fields.iter().enumerate();
                 cells.extend(fields.map(|(k, field)| (first + k, sample.get(*field).unwrap_or(f64::NAN))));
+            }
+            (Content::Sample(sample), _) => {
+                let known = labels[first].len();
+                let value = sample_value(sample, &mut labels[first]);
+                if let Some(word) = labels[first].word(known) {
+                    sink.word(first, word);
+                }
+                cells.push((first, value));
             }
             (Content::Path(path), _) => {
                 let count = crate::recorder::PATH_FIELDS.len();

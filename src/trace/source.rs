@@ -3,7 +3,7 @@
 //! In: a path. Out: [`Source`] with its parts in the order of their names, each readable from its beginning as often as wanted; the
 //! [`TraceFormat`]. The ending of a name decides nothing. Does not interpret the content any further.
 
-use super::text::TextReader;
+use super::text::{TOO_LONG, TextReader};
 use super::wire::TraceFormat;
 use crate::base::Diagnostic;
 use crate::base::diagnostics::Place;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Bytes that are looked at to know what a file is.
 const SNIFF_BYTES: u64 = 64 * 1024;
 /// Unpacked bytes of a zip that are fine whatever its size.
-const UNPACKED_FREE_BYTES: u64 = 256 << 20;
+const UNPACKED_FREE_BYTES: u64 = 64 << 20;
 /// Beyond, so many bytes may come out of one: tables of numbers reach 20.
 const UNPACKED_RATIO_MAX: u64 = 200;
 /// Files of a chain.
@@ -242,6 +242,9 @@ fn natural_key(name: &str) -> Vec<(u64, String)> {
 }
 
 pub(super) fn unreadable(shown: &str, error: &io::Error) -> Diagnostic {
+    if error.to_string() == TOO_LONG {
+        return Diagnostic::error("T0005", format!("{shown} has {TOO_LONG}")).help("this is no trace");
+    }
     Diagnostic::error("T0001", format!("{shown} cannot be read: {error}")).help("check the name of the file")
 }
 

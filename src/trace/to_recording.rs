@@ -16,7 +16,7 @@ use crate::recorder::schema::{
     AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, MONITORING_FIELD, RECORDING_FORMAT, ROTARY_AXIS,
     SAMPLE, SIGNAL_TOPIC_PREFIX,
 };
-use crate::recorder::{ABOUT_METADATA, AXES_METADATA, AXIS_FIELDS, Compression, Target, write_fault, write_options};
+use crate::recorder::{ABOUT_METADATA, AXES_METADATA, Compression, Target, write_fault, write_options};
 use mcap::McapResult;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;

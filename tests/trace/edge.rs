@@ -146,3 +146,22 @@ fn what_is_cut_off_is_taken_and_what_is_wrong_is_marked() {
     let trace = read("edge_null.json", odd.as_bytes(), &named()).unwrap();
     assert!(trace.signal("DES_POS|1").unwrap().values[5].is_nan());
 }
+
+#[test]
+fn an_archive_that_unpacks_without_end_is_refused() {
+    let archive = recorded::temporary("bomb.zip");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&archive).unwrap());
+    let deflated = zip::write::SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Deflated)
+        .compression_level(Some(1));
+    zip.start_file("a.json", deflated).unwrap();
+    zip.write_all(header(CYCLE).as_bytes()).unwrap();
+    // 120 MB of blanks make a tenth of one.
+    let blanks = vec![b' '; 1 << 20];
+    for _ in 0..120 {
+        zip.write_all(&blanks).unwrap();
+    }
+    zip.finish().unwrap();
+    let finding = import(&archive, &named()).unwrap_err();
+    assert!(finding.code == "T0001" && finding.message.contains("bytes come out of one"), "{finding:?}");
+}

@@ -65,9 +65,15 @@ fn a_recording_of_a_trace_is_the_trace() {
         let same = back.signals.iter().find(|other| other.original == signal.original).unwrap();
         assert_eq!(same, signal);
     }
-    // A table is made of it too, with one row an instant.
+    // A table is made of it too, with one row an instant and every signal by its original name.
     let table = exported(&output, ExportForm::Csv, "to_recording.csv");
+    let back = import(&table, &options()).unwrap();
     assert_eq!(std::fs::read_to_string(table).unwrap().lines().count(), 502);
+    for signal in &trace.signals {
+        let same = back.signals.iter().find(|other| other.original == signal.original).unwrap();
+        let values: Vec<f64> = same.resampled_on(&signal.times, sollwert::trace::Method::Hold);
+        assert_eq!(values, signal.values, "{}", signal.original);
+    }
     // The same bytes each time.
     let again = exported(&input, ExportForm::Recording, "to_recording2.mcap");
     assert_eq!(std::fs::read(output).unwrap(), std::fs::read(again).unwrap());
@@ -140,4 +146,25 @@ fn parquet_has_the_columns_of_the_table() {
     }
     // One row a record: where nothing changed there is none.
     assert_eq!(rows, records(&input));
+}
+
+#[test]
+fn the_drives_follow_the_set_points_of_a_trace() {
+    let (input, _) = session("followed.xml");
+    let output = temporary("followed.mcap");
+    let arguments = ["follow", input.to_str().unwrap(), "-m", "spinner_mvc850", "--axis-name", "1=X", "-o"];
+    let done = std::process::Command::new(env!("CARGO_BIN_EXE_sollwert"))
+        .args(arguments)
+        .arg(&output)
+        .output()
+        .expect("the program starts");
+    assert!(output.exists(), "{}", String::from_utf8_lossy(&done.stderr));
+    let followed = import(&output, &ImportOptions::default()).unwrap();
+    let x = followed.signal("X.position_setpoint_mm").unwrap();
+    // 1 s at the position cycle of 1 ms; between two samples of the trace a straight line, which the motion is.
+    assert_eq!((x.len(), x.times.period_s()), (1001, Some(0.001)));
+    for (k, value) in x.values.iter().enumerate() {
+        let expected = super::operate_session::position(k as f64 / 1000.0);
+        assert!((value - expected).abs() < 1e-6, "{k}: {value} {expected}");
+    }
 }

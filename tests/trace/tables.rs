@@ -26,6 +26,9 @@ fn assert_position(trace: &Trace, name: &str) {
     }
 }
 
+/// Name, heads, separator, decimal comma, units of the time in a second, what is said.
+type Dialect<'a> = (&'a str, &'a [&'a str], &'a str, bool, f64, &'a str);
+
 /// A table with a separator, a decimal sign and heads.
 fn table(heads: &[&str], separator: &str, comma: bool, time_scale: f64) -> String {
     let mut text = heads.iter().map(|head| format!("{head}\r\n")).collect::<String>();
@@ -41,7 +44,7 @@ fn table(heads: &[&str], separator: &str, comma: bool, time_scale: f64) -> Strin
 
 #[test]
 fn the_dialect_is_found_and_said() {
-    let cases: [(&str, &[&str], &str, bool, f64, &str); 6] = [
+    let cases: [Dialect; 6] = [
         ("own.csv", &["time_s,X.position_setpoint_mm,path.line"], ",", false, 1.0, "commas, decimal point"),
         ("german.csv", &["Zeit [ms];X_mm;Satz"], ";", true, 1000.0, "semicolons, decimal comma"),
         ("units.csv", &["t;X_mm;line", "ms;mm;"], ";", false, 1000.0, "units in line 2"),
