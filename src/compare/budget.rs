@@ -112,8 +112,8 @@ fn programmed(trace: &Trace, machine: Option<&Machine>) -> Result<Programmed, St
         at.0[axis] = machine.axis(axis).home_lu;
     }
     let geometry = ["X", "Y", "Z"].map(|name| machine.axis_by_name(name));
+    path.start_mm = geometry.map(|axis| axis.map_or(0.0, |axis| at.0[axis]));
     let xyz = |point: &AxisVector| geometry.map(|axis| axis.map_or(0.0, |axis| point[axis]));
-    path.start_mm = xyz(&at.0);
     path.points.push((0, path.start_mm));
     let linear = machine.linear_mask();
     loop {
