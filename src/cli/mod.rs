@@ -13,6 +13,7 @@ mod inputs;
 mod machine;
 mod moves;
 mod output;
+mod recorded;
 mod recover;
 mod run;
 mod time;
