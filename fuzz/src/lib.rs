@@ -68,3 +68,23 @@ pub fn interpreter(bytes: &[u8]) {
     }
     interpreter.take_warnings().iter().for_each(|warning| assert!(!warning.render(false).is_empty()));
 }
+
+/// A trace of any format: it is read or refused, and what is read is in order. The importers read files, so that one is written.
+#[allow(dead_code, reason = "tests/fuzz_corpus.rs has programs only")]
+pub fn trace(bytes: &[u8]) {
+    let path = std::env::temp_dir().join(format!("sollwert-fuzz-{}.trace", std::process::id()));
+    if std::fs::write(&path, bytes).is_err() {
+        return;
+    }
+    match sollwert::trace::import(&path, &sollwert::trace::ImportOptions::default()) {
+        Ok(trace) => {
+            for signal in &trace.signals {
+                assert_eq!(signal.times.len(), signal.values.len(), "{}", signal.original);
+                let next = signal.times.iter().skip(1);
+                assert!(signal.times.iter().zip(next).all(|(one, next)| one < next), "{}", signal.original);
+            }
+            trace.notes.iter().for_each(|note| assert!(!note.render(false).is_empty()));
+        }
+        Err(finding) => assert!(!finding.render(false).is_empty()),
+    }
+}

@@ -3,13 +3,18 @@
 //! In: `-m`, `--set`, paths. Out: machine and program, or findings on stderr and an exit code. Does not run anything.
 
 use super::failure::Failure;
-use super::output::show;
+use super::output::{ProgressLine, show};
 use crate::base::Diagnostic;
+use crate::base::diagnostics::nearest;
+use crate::base::units::percent_from_ratio;
 use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
 use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, unsupported};
 use crate::program::{ProgramSource, taken_axis_names};
+use crate::recorder::{AXIS_FIELDS, axis_field};
+use crate::trace::{ImportOptions, Progress};
 use clap::Args;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// `-m` and `--set`.
@@ -51,6 +56,101 @@ impl MachineChoice {
         let refused = unsupported(&loaded.machine);
         if refused.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(refused)) }
     }
+}
+
+/// How a trace of a control is to be read.
+#[derive(Args)]
+pub(super) struct TraceReading {
+    /// Machine file or shipped machine: names and kinds of the axes behind the numbers in the trace
+    #[arg(short, long, value_name = "MACHINE")]
+    machine: Option<String>,
+    #[command(flatten)]
+    names: TraceNames,
+}
+
+impl TraceReading {
+    /// Calls `act` with the options; progress is shown while it works.
+    pub(super) fn with_options<T>(
+        &self,
+        only: &[String],
+        act: impl FnOnce(&ImportOptions) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let loaded = match &self.machine {
+            Some(name) => Some(load(name, &[]).map_err(refused)?),
+            None => None,
+        };
+        self.names.with_options(loaded.as_ref().map(|loaded| &loaded.machine), only, act)
+    }
+}
+
+/// What the names in a trace mean.
+#[derive(Args)]
+pub(super) struct TraceNames {
+    /// Name of a machine axis by its number in the trace, such as 7=A; may be given several times
+    #[arg(long = "axis-name", value_name = "NUMBER=NAME")]
+    axis_names: Vec<String>,
+    /// Which of our signals a signal of the trace is, such as "ENC2_POS=position_actual"; may be given several times
+    #[arg(long = "map", value_name = "CONTROLLER=OURS")]
+    signal_map: Vec<String>,
+    /// The time column of a CSV: NAME, NAME:SECONDS (what one of its units is), or the distance of the rows in s
+    #[arg(long = "time", value_name = "NAME")]
+    time_column: Option<String>,
+}
+
+impl TraceNames {
+    /// Calls `act` with the options; progress is shown while it works.
+    pub(super) fn with_options<T>(
+        &self,
+        machine: Option<&Machine>,
+        only: &[String],
+        act: impl FnOnce(&ImportOptions) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let progress = RefCell::new(ProgressLine::new());
+        let tell = |done: u64, total: u64| {
+            let share_percent = percent_from_ratio(done as f64 / total.max(1) as f64);
+            progress.borrow_mut().update(|| format!("{share_percent:.0} % read"));
+        };
+        act(&ImportOptions {
+            machine,
+            axis_names: self.axis_names.iter().map(|text| axis_name(text)).collect::<Result<_, _>>()?,
+            signal_map: self.signal_map.iter().map(|text| map_row(text)).collect::<Result<_, _>>()?,
+            time_column: self.time_column.clone(),
+            only: only.to_vec(),
+            progress: Progress(Some(&tell)),
+        })
+    }
+}
+
+/// `7=A`.
+fn axis_name(text: &str) -> Result<(u32, String), Failure> {
+    let parts = text.split_once('=').map(|(number, name)| (number.trim().parse(), name.trim()));
+    match parts {
+        Some((Ok(number), name)) if !name.is_empty() && !name.contains('.') => Ok((number, name.to_owned())),
+        _ => {
+            let message = format!("`--axis-name {text}` names no axis");
+            Err(Failure::unreadable(Diagnostic::error("T0019", message).help("write --axis-name 7=A")))
+        }
+    }
+}
+
+/// `CONTROLLER=OURS`; the last `=` counts, because names of controllers may hold one.
+fn map_row(text: &str) -> Result<(String, String), Failure> {
+    let refuse =
+        |message: String, help: String| Err(Failure::unreadable(Diagnostic::error("T0019", message).help(help)));
+    let Some((theirs, ours)) = text.rsplit_once('=').filter(|(theirs, ours)| !theirs.is_empty() && !ours.is_empty())
+    else {
+        return refuse(format!("`--map {text}` maps nothing"), "write --map CONTROLLER=OURS".to_owned());
+    };
+    let stem = ours.rsplit('.').next().unwrap_or(ours);
+    if !ours.starts_with("path.") && axis_field(stem).is_none() {
+        let known = AXIS_FIELDS.iter().map(|field| field.stem);
+        let near = nearest(stem, known).map_or_else(String::new, |near| format!("; did you mean `{near}`?"));
+        return refuse(
+            format!("`{ours}` is none of our signals"),
+            format!("write a field such as position_setpoint, or X.position_setpoint_mm{near}"),
+        );
+    }
+    Ok((theirs.to_owned(), ours.to_owned()))
 }
 
 /// What happens at the control panel while a program runs.

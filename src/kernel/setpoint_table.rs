@@ -142,6 +142,11 @@ impl SetpointTable {
     }
 }
 
+/// Seconds between rows: the shortest position cycle.
+pub fn row_period_s(machine: &Machine) -> f64 {
+    machine.cycle.time_base.seconds(row_ticks(machine))
+}
+
 /// Ticks between rows: the shortest position cycle.
 pub(super) fn row_ticks(machine: &Machine) -> u64 {
     let cycles = machine.axes.iter().filter_map(|axis| axis.drive.as_ref()).map(|drive| drive.position_cycle_ticks);

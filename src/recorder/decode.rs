@@ -4,10 +4,10 @@
 //! so that newer recordings stay readable. Does not read files.
 
 use super::schema::proto::foxglove::PoseInFrame;
-use super::schema::proto::sollwert::{Event, Path};
+use super::schema::proto::sollwert::{Event, Path, Sample};
 use super::schema::{
     AXIS_FIELD_COUNT, AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, MONITORING_FIELD, PATH,
-    PATH_TOPIC, POSE_IN_FRAME, ROTARY_AXIS, TOOL_TOPICS, ToolPose,
+    PATH_TOPIC, POSE_IN_FRAME, ROTARY_AXIS, SAMPLE, SIGNAL_TOPIC_PREFIX, TOOL_TOPICS, ToolPose,
 };
 use crate::base::AxisKind;
 use prost::Message as _;
@@ -29,6 +29,11 @@ pub enum TopicKind {
     Event,
     /// A pose of the tool.
     Pose(ToolPose),
+    /// A signal of an imported trace that is none of an axis.
+    Signal {
+        /// Name in the file that it came from.
+        original: String,
+    },
     /// Anything that this program does not write.
     Other,
 }
@@ -39,6 +44,9 @@ impl TopicKind {
         match (axis, topic) {
             (Some(name), _) if schema == LINEAR_AXIS.name => Self::Axis { name, kind: AxisKind::Linear },
             (Some(name), _) if schema == ROTARY_AXIS.name => Self::Axis { name, kind: AxisKind::Rotary },
+            (None, topic) if schema == SAMPLE.name && topic.starts_with(SIGNAL_TOPIC_PREFIX) => {
+                Self::Signal { original: topic[SIGNAL_TOPIC_PREFIX.len()..].to_owned() }
+            }
             (None, PATH_TOPIC) if schema == PATH.name => Self::Path,
             (None, EVENT_TOPIC) if schema == EVENT.name => Self::Event,
             (None, topic) if schema == POSE_IN_FRAME.name && topic == TOOL_TOPICS[0] => Self::Pose(ToolPose::Setpoint),
@@ -102,6 +110,8 @@ pub enum Content {
     Event(Box<Event>),
     /// A pose of the tool, in metres.
     Pose(ToolPose, Box<PoseInFrame>),
+    /// A sample of a signal of an imported trace.
+    Sample(Sample),
     /// Data of a topic that this program does not know.
     Other(Vec<u8>),
 }
@@ -113,6 +123,7 @@ impl Content {
             TopicKind::Path => Self::Path(Box::new(Path::decode(data)?)),
             TopicKind::Event => Self::Event(Box::new(Event::decode(data)?)),
             TopicKind::Pose(which) => Self::Pose(*which, Box::new(PoseInFrame::decode(data)?)),
+            TopicKind::Signal { .. } => Self::Sample(Sample::decode(data)?),
             TopicKind::Other => Self::Other(data.to_vec()),
         })
     }

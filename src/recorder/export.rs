@@ -29,10 +29,6 @@ pub struct ExportReport {
 /// Writes a table to a file, by the ending of its name. The file appears when it is complete.
 pub fn export(recording: &Recording, output: &Path) -> Result<ExportReport, Diagnostic> {
     let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_ascii_lowercase();
-    if ending == "parquet" {
-        let message = format!("{} cannot be written: Parquet is not supported yet", output.display());
-        return Err(Diagnostic::error("R0017", message).help("export to a name that ends in .csv"));
-    }
     if ending != "csv" && !output.exists() {
         let message = format!("the format of {} is not known", output.display());
         return Err(Diagnostic::error("R0017", message).help("export to a name that ends in .csv"));
@@ -271,7 +267,7 @@ impl<'a> Cell<'a> {
 }
 
 /// The shortest decimal that reads back to the same f64: without `.0`.
-fn push_number(line: &mut Vec<u8>, value: f64) {
+pub(crate) fn push_number(line: &mut Vec<u8>, value: f64) {
     let mut buffer = ryu::Buffer::new();
     let text = buffer.format(value);
     line.extend_from_slice(text.strip_suffix(".0").unwrap_or(text).as_bytes());
@@ -282,7 +278,7 @@ fn push_integer(line: &mut Vec<u8>, value: u64) {
 }
 
 /// A text as RFC 4180 has it: in quotation marks where it holds a comma, a quotation mark or a line end.
-fn push_text(line: &mut String, text: &str) {
+pub(crate) fn push_text(line: &mut String, text: &str) {
     if !text.contains([',', '"', '\n', '\r']) {
         line.push_str(text);
         return;

@@ -24,6 +24,7 @@ pub use contents::AttachmentInfo;
 pub use decode::{AxisSample, Content, TopicKind};
 pub use event::EventRecord;
 pub use export::{ExportReport, export, export_csv};
+pub(crate) use export::{push_number, push_text};
 pub use front::Recorder;
 pub use reader::{Message, Messages, Recording, Topic};
 pub use recover::{RECOVERED_METADATA, RecoverReport, recover};
@@ -32,4 +33,6 @@ pub use setup::{
     ABOUT_METADATA, AXES_METADATA, CYCLE_METADATA, Compression, INPUTS_METADATA, MACHINE_MEDIA_TYPE,
     PROGRAM_MEDIA_TYPE, RecordingSetup, SUMMARY_METADATA, UNITS_METADATA,
 };
+pub(crate) use target::{Target, WholeFile};
 pub use writer::RecordingSummary;
+pub(crate) use writer::{write_fault, write_options};

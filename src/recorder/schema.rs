@@ -23,6 +23,8 @@ pub const EVENT_TOPIC: &str = "/event";
 pub const TOOL_TOPICS: [&str; 2] = ["/tool/setpoint", "/tool/actual"];
 /// What the topics of the axes begin with; the name of the axis follows.
 pub const AXIS_TOPIC_PREFIX: &str = "/axis/";
+/// What the topics of other signals of imported traces begin with; the name in the file follows.
+pub const SIGNAL_TOPIC_PREFIX: &str = "/signal/";
 /// Frame of the tool poses: the basic coordinate system, in which the part stands still.
 pub const POSE_FRAME: &str = "part";
 
@@ -64,6 +66,9 @@ pub const PATH: SchemaText =
 /// Schema of the events.
 pub const EVENT: SchemaText =
     SchemaText { name: "sollwert.Event", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/event.fds")) };
+/// Schema of the signals of imported traces that are none of an axis.
+pub const SAMPLE: SchemaText =
+    SchemaText { name: "sollwert.Sample", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/sample.fds")) };
 /// Schema of the tool poses.
 pub const POSE_IN_FRAME: SchemaText = SchemaText {
     name: "foxglove.PoseInFrame",

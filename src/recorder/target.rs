@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const BUFFER_BYTES: usize = 64 * 1024;
 
 /// Any place for bytes, with a counter.
-pub(super) struct Target {
+pub(crate) struct Target {
     sink: BufWriter<Box<dyn Write + Send>>,
     /// To wait for the disk in the end; `None` for pipes and writers in memory.
     file: Option<File>,
@@ -21,7 +21,7 @@ pub(super) struct Target {
 
 impl Target {
     /// Creates or empties a file.
-    pub(super) fn file(path: &Path) -> io::Result<Self> {
+    pub(crate) fn file(path: &Path) -> io::Result<Self> {
         let file = File::create(path)?;
         let regular = file.metadata()?.is_file();
         let handle = if regular { Some(file.try_clone()?) } else { None };
@@ -29,17 +29,17 @@ impl Target {
     }
 
     /// Takes any writer.
-    pub(super) fn writer(writer: impl Write + Send + 'static) -> Self {
+    pub(crate) fn writer(writer: impl Write + Send + 'static) -> Self {
         Self { sink: BufWriter::with_capacity(BUFFER_BYTES, Box::new(writer)), file: None, bytes: 0 }
     }
 
     /// Bytes so far.
-    pub(super) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.bytes
     }
 
     /// Pushes everything out and waits for the disk: some disks report only then that they are full.
-    pub(super) fn complete(&mut self) -> io::Result<()> {
+    pub(crate) fn complete(&mut self) -> io::Result<()> {
         self.sink.flush()?;
         self.file.as_ref().map_or(Ok(()), File::sync_all)
     }
@@ -62,7 +62,7 @@ impl Write for Target {
 }
 
 /// A file that gets its name when it is complete. Dropped before, it leaves nothing behind.
-pub(super) struct WholeFile {
+pub(crate) struct WholeFile {
     shown: String,
     path: PathBuf,
     /// `None`: the path is a device or a pipe, which is written to directly.
@@ -71,7 +71,7 @@ pub(super) struct WholeFile {
 
 impl WholeFile {
     /// Opens `NAME.partial` beside the path.
-    pub(super) fn create(path: &Path) -> Result<(Self, Target), Diagnostic> {
+    pub(crate) fn create(path: &Path) -> Result<(Self, Target), Diagnostic> {
         let shown = path.display().to_string();
         let existing = fs::metadata(path).ok();
         if existing.as_ref().is_some_and(fs::Metadata::is_dir) {
@@ -92,7 +92,7 @@ impl WholeFile {
     }
 
     /// Completes the bytes and gives the file its name.
-    pub(super) fn commit(mut self, mut target: Target) -> Result<u64, Diagnostic> {
+    pub(crate) fn commit(mut self, mut target: Target) -> Result<u64, Diagnostic> {
         target.complete().map_err(|error| self.fault(&error))?;
         let bytes = target.bytes();
         drop(target);
@@ -104,7 +104,7 @@ impl WholeFile {
     }
 
     /// A fault of this file.
-    pub(super) fn fault(&self, error: &io::Error) -> Diagnostic {
+    pub(crate) fn fault(&self, error: &io::Error) -> Diagnostic {
         Diagnostic::error("R0004", format!("{} cannot be written: {error}", self.shown))
             .help("make room or choose another place; nothing was left behind")
     }

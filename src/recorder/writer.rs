@@ -44,7 +44,7 @@ pub struct RecordingSummary {
 
 /// Options of every file that this room writes. Compression on the calling thread and no seeking: the same bytes each time, and
 /// a file that is whole up to its last finished chunk.
-pub(super) fn write_options(compression: Compression) -> WriteOptions {
+pub(crate) fn write_options(compression: Compression) -> WriteOptions {
     WriteOptions::new()
         .compression(match compression {
             Compression::Zstd => Some(mcap::Compression::Zstd),
@@ -326,7 +326,7 @@ fn add_channel(
 }
 
 /// A fault while writing, said with the name of the file.
-pub(super) fn write_fault(name: &str, error: &McapError) -> Diagnostic {
+pub(crate) fn write_fault(name: &str, error: &McapError) -> Diagnostic {
     let reason = match error {
         McapError::Io(error) => error.to_string(),
         other => other.to_string(),

@@ -1,13 +1,21 @@
 //! The door: finds out what a file is by its content and calls the importer.
 //!
-//! In: a path, [`ImportOptions`]. Out: a [`Trace`]. Errors say what the file is taken for and what is wrong with it. Does not look
-//! at the ending of the name.
+//! In: a path, [`ImportOptions`]. Out: a [`Trace`] in memory, or its rows one after another for a sink. Errors say what the file is
+//! taken for and what is wrong with it. Does not look at the ending of the name.
 
+use super::csv::read_csv;
+use super::edge::read_edge;
+use super::measuring::read_measuring;
+use super::operate::read_operate;
 use super::recording::import_recording;
-use super::wire::Trace;
+use super::scope::{read_halsampler, read_halscope, read_twincat};
+use super::sink::{Memory, Sink};
+use super::source::{Progress, Source};
+use super::wire::{AxisSignal, Origin, Trace, TraceFormat};
 use crate::base::Diagnostic;
 use crate::machine::Machine;
 use crate::recorder::Recording;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What the user says about a trace.
@@ -24,17 +32,74 @@ pub struct ImportOptions<'a> {
     /// Signals to keep, by any of their names or by field without axis (`position_setpoint`); empty keeps all. A long recording
     /// with all its signals does not fit into memory.
     pub only: Vec<String>,
+    /// Told how far the reading is.
+    pub progress: Progress<'a>,
 }
 
 impl ImportOptions<'_> {
     /// Whether a signal of ours is asked for.
     pub(super) fn wants(&self, name: &str) -> bool {
-        let stem = super::wire::AxisSignal::parse(name).map(|signal| signal.stem());
-        self.only.is_empty() || self.only.iter().any(|only| only == name || Some(only.as_str()) == stem)
+        let signal = AxisSignal::parse(name);
+        let fits = |only: &String| {
+            only == name || signal.is_some_and(|signal| only == signal.stem() || *only == signal.name_without_unit())
+        };
+        self.only.is_empty() || self.only.iter().any(fits)
     }
 }
 
-/// Reads a trace of any known format.
+/// What an importer knows of a trace besides its rows.
+#[derive(Debug, Default)]
+pub(super) struct About {
+    pub(super) origin: Origin,
+    pub(super) metadata: BTreeMap<String, BTreeMap<String, String>>,
+    pub(super) notes: Vec<Diagnostic>,
+}
+
+/// Reads a trace of any known format into memory.
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Trace, Diagnostic> {
-    import_recording(&Recording::open(path)?, options)
+    let source = Source::open(path, options.progress)?;
+    let format = source.format()?;
+    if format == TraceFormat::Recording {
+        return import_recording(&Recording::open(path)?, options);
+    }
+    let mut memory = Memory::new(&options.only);
+    let about = read_rows(&source, format, options, &mut memory)?;
+    let (signals, mut events) = memory.finish();
+    events.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
+    Ok(Trace {
+        name: source.shown.clone(),
+        origin: about.origin,
+        signals,
+        events,
+        metadata: about.metadata,
+        notes: about.notes,
+        ..Trace::default()
+    })
+}
+
+/// Reads a trace of any format but a recording, row by row.
+pub(super) fn read_rows(
+    source: &Source,
+    format: TraceFormat,
+    options: &ImportOptions,
+    sink: &mut dyn Sink,
+) -> Result<About, Diagnostic> {
+    let mut about = match format {
+        TraceFormat::OperateXml => read_operate(source, 0, options, sink)?,
+        TraceFormat::EdgeJson => read_edge(source, options, sink)?,
+        TraceFormat::Csv => read_csv(source, 0, options, sink)?,
+        TraceFormat::TwinCatCsv => read_twincat(source, 0, options, sink)?,
+        TraceFormat::Halscope => read_halscope(source, 0, options, sink)?,
+        TraceFormat::Halsampler => read_halsampler(source, 0, options, sink)?,
+        TraceFormat::MeasuringXml => read_measuring(source, 0, options, sink)?,
+        TraceFormat::Recording => {
+            let message = format!("{} is a recording in an archive", source.shown);
+            return Err(Diagnostic::error("T0018", message).help("unpack it, and name the recording"));
+        }
+    };
+    if source.part_count() > 1 && format != TraceFormat::EdgeJson {
+        let message = format!("only `{}` is read of {} files", source.part_name(0), source.part_count());
+        about.notes.push(Diagnostic::warning("T0018", message).help("unpack them, and read them one by one"));
+    }
+    Ok(about)
 }

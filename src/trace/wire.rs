@@ -180,7 +180,7 @@ impl<'a> AxisSignal<'a> {
         AXIS_FIELDS[self.field].stem
     }
 
-    fn name_without_unit(&self) -> String {
+    pub(super) fn name_without_unit(&self) -> String {
         format!("{}.{}", self.axis, self.stem())
     }
 }
@@ -285,10 +285,10 @@ impl TimeGrid {
     }
 
     /// The grid of given times: uniform where they all lie within `tolerance_s` of one, explicit otherwise.
-    pub fn from_times(times: Vec<f64>, tolerance_s: f64) -> Self {
-        match uniform(&times, tolerance_s) {
-            Some((start_ns, step_ns)) => Self::Uniform { start_ns, step_ns, count: times.len() },
-            None => Self::Explicit(times.into()),
+    pub fn from_times(times_s: Vec<f64>, tolerance_s: f64) -> Self {
+        match uniform(&times_s, tolerance_s) {
+            Some((start_ns, step_ns)) => Self::Uniform { start_ns, step_ns, count: times_s.len() },
+            None => Self::Explicit(times_s.into()),
         }
     }
 }

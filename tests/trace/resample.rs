@@ -17,7 +17,7 @@ fn signal(times: &[f64], value: impl Fn(f64) -> f64) -> Signal {
 }
 
 fn uniform() -> Vec<f64> {
-    (0..50).map(|k| f64::from(k) * 0.002).collect()
+    (0..50).map(|k| f64::from(k) / 500.0).collect()
 }
 
 /// Steps of 1, 3, 2 ms and so on.

@@ -1,0 +1,41 @@
+//! Faults that are repaired and may come a million times: counted, and said once each with the place of the first.
+//!
+//! In: code, sentence, byte. Out: findings in the order of their first appearance. Does not decide what is a fault.
+
+use crate::base::Diagnostic;
+
+/// Sorts of faults that are kept apart.
+const SORTS_MAX: usize = 32;
+
+/// Counts.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    sorts: Vec<(&'static str, &'static str, u64, u64)>,
+}
+
+impl Faults {
+    /// One more of its sort; `message` reads "a record ...".
+    pub(super) fn count(&mut self, code: &'static str, message: &'static str, byte: u64) {
+        if let Some(sort) = self.sorts.iter_mut().find(|sort| sort.0 == code && sort.1 == message) {
+            sort.2 += 1;
+        } else if self.sorts.len() < SORTS_MAX {
+            self.sorts.push((code, message, 1, byte));
+        }
+    }
+
+    /// What was counted; `finding` makes a diagnostic of code, message and byte.
+    pub(super) fn findings(
+        &self,
+        finding: impl Fn(&'static str, String, u64) -> Diagnostic,
+    ) -> impl Iterator<Item = Diagnostic> {
+        let findings: Vec<Diagnostic> = self
+            .sorts
+            .iter()
+            .map(|(code, message, count, byte)| {
+                let times = if *count > 1 { format!(" ({count} times)") } else { String::new() };
+                finding(code, format!("{message}{times}"), *byte)
+            })
+            .collect();
+        findings.into_iter()
+    }
+}

@@ -1,0 +1,364 @@
+//! TwinCAT Scope CSV, LinuxCNC halscope and halsampler -> rows.
+//!
+//! In: a text. Out: heads and rows for a [`Sink`]. TwinCAT writes pairs of time and value, channel by channel, each on its own grid; the
+//! channels are merged in memory. halscope says its period; halsampler does not: `--time SECONDS` gives it, 1 ms is assumed else.
+
+use super::columns::named_head;
+use super::delimited::{cells, number};
+use super::faults::Faults;
+use super::import::{About, ImportOptions};
+use super::naming::{NamedHead, Naming};
+use super::sink::{Head, Layout, Sink};
+use super::source::{PartReader, Source, unreadable};
+use super::wire::{Clock, Origin, TraceFormat};
+use crate::base::Diagnostic;
+use crate::base::units::{MS_PER_S, NS_PER_S};
+use std::collections::BTreeMap;
+
+/// Lines of a head.
+const HEAD_LINES_MAX: usize = 200;
+/// The usual servo thread of LinuxCNC.
+const SERVO_THREAD_S: f64 = 0.001;
+/// Samples of all channels of a TwinCAT file.
+const SAMPLES_MAX: usize = 200_000_000;
+
+struct Lines<'a> {
+    source: &'a Source<'a>,
+    part: usize,
+    reader: PartReader<'a>,
+    line: String,
+    at: u64,
+}
+
+impl<'a> Lines<'a> {
+    fn new(source: &'a Source<'a>, part: usize) -> Result<Self, Diagnostic> {
+        Ok(Self { source, part, reader: source.read(part)?, line: String::new(), at: 0 })
+    }
+
+    fn advance(&mut self) -> Result<bool, Diagnostic> {
+        self.at = self.reader.consumed();
+        let shown = self.source.part_name(self.part);
+        self.reader.line(&mut self.line).map_err(|error| unreadable(shown, &error))
+    }
+
+    fn notes(&self, faults: &Faults, naming: &mut Naming) -> Vec<Diagnostic> {
+        let mut notes = std::mem::take(&mut naming.notes);
+        if let Some(remark) = self.reader.encoding_remark() {
+            notes.push(Diagnostic::note("T0014", remark));
+        }
+        let finding = |code: &'static str, message: String, byte: u64| {
+            let finding = Diagnostic::warning(code, message);
+            match self.source.place(self.part, byte, "the first one") {
+                Some(place) => finding.at(place),
+                None => finding,
+            }
+        };
+        notes.extend(faults.findings(finding));
+        notes
+    }
+
+    fn nothing(&self) -> Diagnostic {
+        Diagnostic::error("T0003", format!("{} has no samples", self.source.part_name(self.part)))
+    }
+}
+
+fn origin(format: TraceFormat) -> Origin {
+    Origin { format, description: format.title().to_owned(), start_utc: None }
+}
+
+/// A channel of a TwinCAT file.
+#[derive(Default)]
+struct Channel {
+    named: NamedHead,
+    times_s: Vec<f64>,
+    values: Vec<f64>,
+}
+
+/// Reads a TwinCAT Scope CSV.
+pub(super) fn read_twincat(
+    source: &Source,
+    part: usize,
+    options: &ImportOptions,
+    sink: &mut dyn Sink,
+) -> Result<About, Diagnostic> {
+    let mut lines = Lines::new(source, part)?;
+    let mut head: Vec<Vec<String>> = Vec::new();
+    let mut separator = '\t';
+    let first_row = loop {
+        if !lines.advance()? || head.len() > HEAD_LINES_MAX {
+            return Err(lines.nothing());
+        }
+        if head.is_empty() {
+            separator = ['\t', ';', ','].into_iter().find(|c| lines.line.contains(*c)).unwrap_or('\t');
+        }
+        let row = cells(&lines.line, separator);
+        let numbers = row.iter().all(|cell| number(cell, separator != ',').is_some());
+        if numbers && row.iter().any(|cell| !cell.is_empty()) {
+            break row;
+        }
+        head.push(row);
+    };
+    let mut naming = Naming::new(TraceFormat::TwinCatCsv, options);
+    let (mut channels, periods_s, metadata) = channels(&head, &mut naming);
+    let mut faults = Faults::default();
+    let mut row = first_row;
+    let (mut rows, mut samples) = (0_u64, 0_usize);
+    loop {
+        samples += take_row(&row, separator, rows, &mut channels, &periods_s, lines.at, &mut faults);
+        rows += 1;
+        if samples > SAMPLES_MAX {
+            let message = format!("{} has more than {SAMPLES_MAX} samples", source.part_name(part));
+            return Err(Diagnostic::error("T0017", message).help("export fewer channels, or a shorter time"));
+        }
+        if !lines.advance()? || lines.line.trim() == "EOF" {
+            break;
+        }
+        row = cells(&lines.line, separator);
+    }
+    merge(&mut channels, &periods_s, sink)?;
+    let notes = lines.notes(&faults, &mut naming);
+    let metadata = BTreeMap::from([("twincat".to_owned(), metadata)]);
+    Ok(About { origin: origin(TraceFormat::TwinCatCsv), metadata, notes })
+}
+
+type Head2 = (Vec<Channel>, Vec<Option<f64>>, BTreeMap<String, String>);
+
+/// Channels, their sampling periods, and what the head says of the file.
+fn channels(head: &[Vec<String>], naming: &mut Naming) -> Head2 {
+    let mut metadata = BTreeMap::new();
+    // The head of the channels begins at the last line whose key is `Name`.
+    let begin = head.iter().rposition(|row| row.first().is_some_and(|key| key == "Name")).unwrap_or(0);
+    for row in &head[..begin] {
+        if let [key, value, ..] = row.as_slice() {
+            metadata.insert(key.clone(), value.clone());
+        }
+    }
+    let value = |key: &str, channel: usize| {
+        let row = head[begin..].iter().find(|row| row.first().is_some_and(|own| own == key))?;
+        row.get(2 * channel + 1).filter(|text| !text.is_empty()).cloned()
+    };
+    let count = head.get(begin).map_or(0, |row| row.len().div_ceil(2));
+    let mut named = Vec::new();
+    let mut periods_s = Vec::new();
+    for channel in 0..count {
+        let Some(name) = value("SymbolName", channel).or_else(|| value("Name", channel)) else { break };
+        let mut entry = named_head(&name, None, false, naming);
+        entry.head.clock = Clock::Servo;
+        named.push(entry);
+        let period = value("SampleTime[ms]", channel).and_then(|text| number(&text, true));
+        periods_s.push(period.filter(|period| *period > 0.0).map(|period_ms| period_ms / MS_PER_S));
+    }
+    naming.settle(&mut named);
+    let channels = named.into_iter().map(|named| Channel { named, ..Channel::default() }).collect();
+    (channels, periods_s, metadata)
+}
+
+/// Samples of one row: pairs, one time for all, or none. Returns how many there were.
+fn take_row(
+    row: &[String],
+    separator: char,
+    index: u64,
+    channels: &mut [Channel],
+    periods_s: &[Option<f64>],
+    at: u64,
+    faults: &mut Faults,
+) -> usize {
+    let read =
+        |place: usize| row.get(place).filter(|text| !text.is_empty()).and_then(|text| number(text, separator != ','));
+    let count = channels.len();
+    let mut taken = 0;
+    for (channel, entry) in channels.iter_mut().enumerate() {
+        let (time_s, value) = if row.len() >= 2 * count {
+            (read(2 * channel).map(|time_ms| time_ms / MS_PER_S), read(2 * channel + 1))
+        } else if row.len() == count + 1 {
+            (read(0).map(|time_ms| time_ms / MS_PER_S), read(channel + 1))
+        } else {
+            (periods_s.get(channel).copied().flatten().map(|period_s| index as f64 * period_s), read(channel))
+        };
+        let (Some(time_s), Some(value)) = (time_s.filter(|time| time.is_finite()), value) else { continue };
+        if entry.times_s.last().is_some_and(|last| time_s <= *last) {
+            faults.count("T0009", "a sample is not later than the one before and is left out", at);
+            continue;
+        }
+        entry.times_s.push(time_s);
+        entry.values.push(value * entry.named.factor);
+        taken += 1;
+    }
+    taken
+}
+
+/// Channels on their own grids as rows in order of time.
+fn merge(channels: &mut [Channel], periods_s: &[Option<f64>], sink: &mut dyn Sink) -> Result<(), Diagnostic> {
+    let mut heads: Vec<Head> = Vec::new();
+    for (channel, period_s) in channels.iter().zip(periods_s) {
+        heads.push(Head { layout: Layout::Own, period_s: *period_s, ..channel.named.head.clone() });
+    }
+    sink.begin(&heads)?;
+    let mut next = vec![0_usize; channels.len()];
+    let mut row = Vec::new();
+    loop {
+        let due = channels.iter().zip(&next).filter_map(|(channel, at)| channel.times_s.get(*at).copied());
+        let Some(now_s) = due.min_by(f64::total_cmp) else { return Ok(()) };
+        row.clear();
+        for (place, channel) in channels.iter().enumerate() {
+            if channel.times_s.get(next[place]) == Some(&now_s) {
+                row.push((place, channel.values[next[place]]));
+                next[place] += 1;
+            }
+        }
+        sink.row(now_s, &row)?;
+    }
+}
+
+/// Reads what halscope saved.
+pub(super) fn read_halscope(
+    source: &Source,
+    part: usize,
+    options: &ImportOptions,
+    sink: &mut dyn Sink,
+) -> Result<About, Diagnostic> {
+    let mut lines = Lines::new(source, part)?;
+    let mut period_s = None;
+    let names = loop {
+        if !lines.advance()? {
+            return Err(lines.nothing());
+        }
+        let line = lines.line.trim();
+        if let Some(rest) = line.strip_prefix("# Sampling period is") {
+            let digits = rest.split_whitespace().next().and_then(|text| text.parse::<f64>().ok());
+            period_s = digits.filter(|period| *period > 0.0).map(|period_ns| period_ns / NS_PER_S);
+        } else if !line.is_empty() && !line.starts_with('#') {
+            break cells(line, ';');
+        }
+    };
+    let Some(period_s) = period_s else {
+        let message = format!("{} does not say its sampling period in ns", source.part_name(part));
+        return Err(
+            Diagnostic::error("T0015", message).help("its first line should be `# Sampling period is 1000000 ns`")
+        );
+    };
+    let mut naming = Naming::new(TraceFormat::Halscope, options);
+    let named = begin_columns(&names, period_s, &mut naming, sink)?;
+    let mut faults = Faults::default();
+    let mut rows = 0_u64;
+    let mut row = Vec::new();
+    while lines.advance()? {
+        let line = lines.line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        row.clear();
+        for (place, (text, named)) in cells(line, ';').iter().zip(&named).enumerate() {
+            let value = number(text, true).unwrap_or_else(|| {
+                faults.count("T0010", "a value is no number: a gap", lines.at);
+                f64::NAN
+            });
+            row.push((place, value * named.factor));
+        }
+        sink.row(at_row(rows, period_s), &row)?;
+        rows += 1;
+    }
+    if rows == 0 {
+        return Err(lines.nothing());
+    }
+    let notes = lines.notes(&faults, &mut naming);
+    Ok(About { origin: origin(TraceFormat::Halscope), notes, ..About::default() })
+}
+
+/// Whole nanoseconds where the period is one.
+fn at_row(row: u64, period_s: f64) -> f64 {
+    let period_ns = period_s * NS_PER_S;
+    let whole = period_ns.round();
+    if (whole - period_ns).abs() < 1e-3 { row as f64 * whole / NS_PER_S } else { row as f64 * period_s }
+}
+
+fn begin_columns(
+    names: &[String],
+    period_s: f64,
+    naming: &mut Naming,
+    sink: &mut dyn Sink,
+) -> Result<Vec<NamedHead>, Diagnostic> {
+    let mut named: Vec<NamedHead> = names.iter().map(|name| named_head(name, None, false, naming)).collect();
+    naming.settle(&mut named);
+    let head = |named: &NamedHead| Head { clock: Clock::Servo, period_s: Some(period_s), ..named.head.clone() };
+    let heads: Vec<Head> = named.iter().map(head).collect();
+    sink.begin(&heads)?;
+    Ok(named)
+}
+
+/// Reads what halsampler wrote.
+pub(super) fn read_halsampler(
+    source: &Source,
+    part: usize,
+    options: &ImportOptions,
+    sink: &mut dyn Sink,
+) -> Result<About, Diagnostic> {
+    let given = options.time_column.as_deref().and_then(|text| text.parse::<f64>().ok());
+    let period_s = given.filter(|period| *period > 0.0 && period.is_finite()).unwrap_or(SERVO_THREAD_S);
+    let mut naming = Naming::new(TraceFormat::Halsampler, options);
+    if given.is_none() {
+        let message = format!("halsampler does not say its period: {period_s} s is assumed");
+        naming.notes.push(Diagnostic::warning("T0015", message).help("give it with --time 0.001"));
+    }
+    let numbered = has_numbers(source, part)?;
+    let mut lines = Lines::new(source, part)?;
+    let (mut columns, mut next, mut rows) = (Vec::new(), 0_u64, 0_u64);
+    let mut first = None;
+    let mut faults = Faults::default();
+    while lines.advance()? {
+        let line = lines.line.trim().to_owned();
+        if line == "overrun" {
+            faults.count("T0013", "samples were lost (overrun): a gap", lines.at);
+            if !numbered && rows > 0 {
+                let gap: Vec<(usize, f64)> = (0..columns.len()).map(|column| (column, f64::NAN)).collect();
+                sink.row(at_row(next, period_s), &gap)?;
+                next += 1;
+            }
+            continue;
+        }
+        let values: Vec<f64> = line.split_whitespace().map(|text| text.parse().unwrap_or(f64::NAN)).collect();
+        let (place, values) = match values.split_first() {
+            None => continue,
+            Some((number, rest)) if numbered => {
+                let number = number.max(0.0) as u64;
+                (number - *first.get_or_insert(number).min(&mut number.clone()), rest.to_vec())
+            }
+            Some(_) => (next, values),
+        };
+        if columns.is_empty() {
+            let names: Vec<String> = (1..=values.len()).map(|column| format!("column {column}")).collect();
+            columns = begin_columns(&names, period_s, &mut naming, sink)?;
+        }
+        if rows > 0 && place < next {
+            faults.count("T0009", "a sample is not later than the one before and is left out", lines.at);
+            continue;
+        }
+        if rows > 0 && place > next {
+            let gap: Vec<(usize, f64)> = (0..columns.len()).map(|column| (column, f64::NAN)).collect();
+            sink.row(at_row(next, period_s), &gap)?;
+        }
+        let row: Vec<(usize, f64)> = values.into_iter().take(columns.len()).enumerate().collect();
+        sink.row(at_row(place, period_s), &row)?;
+        next = place + 1;
+        rows += 1;
+    }
+    if rows == 0 {
+        return Err(lines.nothing());
+    }
+    let notes = lines.notes(&faults, &mut naming);
+    Ok(About { origin: origin(TraceFormat::Halsampler), notes, ..About::default() })
+}
+
+/// Whether the first column counts the samples (`halsampler -t`).
+fn has_numbers(source: &Source, part: usize) -> Result<bool, Diagnostic> {
+    let mut lines = Lines::new(source, part)?;
+    let mut numbers: Vec<f64> = Vec::new();
+    while numbers.len() < 20 && lines.advance()? {
+        let mut words = lines.line.split_whitespace();
+        if let (Some(first), Some(_)) = (words.next().and_then(|text| text.parse::<f64>().ok()), words.next()) {
+            numbers.push(first);
+        }
+    }
+    let counts = numbers.windows(2).filter(|pair| pair[1] - pair[0] == 1.0).count();
+    Ok(numbers.len() > 1 && numbers.iter().all(|number| number.fract() == 0.0) && 2 * counts >= numbers.len() - 1)
+}

@@ -1,0 +1,64 @@
+//! TwinCAT Scope, halscope, halsampler.
+
+use super::operate::read;
+use sollwert::trace::{ImportOptions, Method, TraceFormat, Zero};
+
+#[test]
+fn a_scope_file_has_channels_on_their_own_grids() {
+    let rows = |comma: bool| {
+        let mut text = String::new();
+        for k in 0..100 {
+            // The second channel is ten times slower: its pairs end early.
+            let fast = format!("{k}\t{:.1}", f64::from(k) * 0.5);
+            let slow = if k < 10 { format!("{}\t{:.2}", 10 * k, f64::from(k) * 0.25) } else { "\t".to_owned() };
+            text += &format!("{fast}\t{slow}\r\n");
+        }
+        if comma { text.replace('.', ",") } else { text }
+    };
+    for comma in [false, true] {
+        let head = "Name\tProject\r\nFile\tscope.svdx\r\nStarttime of export\t132549876543210000\r\nEndtime of export\t132549876544210000\r\n\r\n\
+            Name\tAxes.X.ActPos\tName\tSetVelo\r\nSymbolComment\t\tSymbolComment\t\r\nSampleTime[ms]\t1\tSampleTime[ms]\t10\r\n\
+            SymbolName\tAxes.X.ActPos\tSymbolName\tAxes.Y.SetVelo\r\n\r\n";
+        let trace =
+            read("scope.csv", format!("{head}{}EOF\r\n", rows(comma)).as_bytes(), &ImportOptions::default()).unwrap();
+        assert_eq!(trace.origin.format, TraceFormat::TwinCatCsv);
+        let fast = trace.signal("X.position_measured_mm").unwrap();
+        assert_eq!((fast.len(), fast.times.period_s(), fast.meaning.zero), (100, Some(0.001), Zero::Encoder));
+        assert_eq!(fast.values[99], 49.5);
+        let slow = trace.signal("Axes.Y.SetVelo").unwrap();
+        assert_eq!((slow.len(), slow.times.period_s(), slow.values[9]), (10, Some(0.01), 2.25));
+        assert_eq!(slow.name.as_deref(), Some("Y.velocity_setpoint_mm_s"));
+    }
+}
+
+#[test]
+fn halscope_says_its_period() {
+    let mut text = String::from("# Sampling period is 1000000 ns\njoint.0.motor-pos-cmd;joint.0.f-error;spindle\n");
+    text += "# Position: 0; 0; 0;\n# Scale: 1; 1; 1;\n";
+    (0..50).for_each(|k| text += &format!("{};{:e};1\n", f64::from(k) * 0.25, 1e-3));
+    let trace = read("hal.txt", text.as_bytes(), &ImportOptions::default()).unwrap();
+    assert_eq!(trace.origin.format, TraceFormat::Halscope);
+    let setpoint = trace.signal("X.position_setpoint_mm").unwrap();
+    assert_eq!((setpoint.times.period_s(), setpoint.values[49]), (Some(0.001), 12.25));
+    assert_eq!(trace.signal("X.following_error_mm").unwrap().values[3], 1e-3);
+}
+
+#[test]
+fn halsampler_counts_and_an_overrun_is_a_gap() {
+    let row = |k: i32| format!("{k} {} {}\n", f64::from(k) * 0.5, 7);
+    let text: String = (100..150).map(row).collect::<String>() + "overrun\n" + &(160..200).map(row).collect::<String>();
+    let options = ImportOptions {
+        time_column: Some("0.002".to_owned()),
+        signal_map: vec![("column 1".to_owned(), "X.position_setpoint_mm".to_owned())],
+        ..ImportOptions::default()
+    };
+    let trace = read("sampler.txt", text.as_bytes(), &options).unwrap();
+    assert_eq!(trace.origin.format, TraceFormat::Halsampler);
+    let signal = trace.signal("X.position_setpoint_mm").unwrap();
+    assert_eq!(signal.value_at(0.0, Method::Hold), 50.0);
+    assert_eq!(signal.value_at(0.12, Method::Linear), 80.0);
+    assert!(signal.value_at(0.11, Method::Linear).is_nan());
+    assert!(trace.notes.iter().any(|note| note.code == "T0013"));
+    let unsaid = read("sampler2.txt", text.as_bytes(), &ImportOptions::default()).unwrap();
+    assert!(unsaid.notes.iter().any(|note| note.code == "T0015"));
+}
