@@ -5,7 +5,7 @@ mod test_machine;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use sollwert::base::TimeBase;
-use sollwert::drive::{AxisDrive, DriveInput, Start};
+use sollwert::drive::{AxisDrive, DriveBatch, DriveInput, Start};
 use sollwert::machine::Axis;
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -73,5 +73,41 @@ fn drives(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, drives);
+/// Sixty-four parameter sets of one axis in step.
+fn batch(criterion: &mut Criterion) {
+    const LANES: u32 = 64;
+    let (axis, time_base) = axis(0.0);
+    let drives: Vec<AxisDrive> = (0..LANES)
+        .filter_map(|n| {
+            let mut axis = axis.clone();
+            if let Some(drive) = &mut axis.drive {
+                drive.position_gain_per_s *= 1.0 + 0.005 * f64::from(n);
+                drive.mechanics.coulomb_friction_n_m *= 1.0 + 0.01 * f64::from(n);
+            }
+            AxisDrive::new(&axis, &time_base, Start::Held, 0.0)
+        })
+        .collect();
+    let inputs: Vec<Vec<DriveInput>> = setpoints(0.0).into_iter().map(|input| vec![input; LANES as usize]).collect();
+    let steps = drives.iter().map(|drive| u64::from(drive.ticks_per_step() * CYCLES)).sum();
+    let start = DriveBatch::new(drives);
+    let mut group = criterion.benchmark_group("axis current-steps");
+    group.throughput(Throughput::Elements(steps)).sample_size(20);
+    group.bench_function("64 parameter sets in step", |bencher| {
+        bencher.iter_batched(
+            || start.clone(),
+            |mut batch| {
+                for inputs in &inputs {
+                    batch.step(inputs, |_, signals| {
+                        black_box(signals);
+                    });
+                }
+                batch
+            },
+            criterion::BatchSize::LargeInput,
+        );
+    });
+    group.finish();
+}
+
+criterion_group!(benches, drives, batch);
 criterion_main!(benches);

@@ -35,7 +35,7 @@ fn errors_of(output: &Output) -> String {
 fn json_is_one_document_whatever_is_wrong_with_the_input() {
     let folder = folder("command_json");
     for input in ["missing", "directory", "empty", "junk"] {
-        let calls: [&[&str]; 9] = [
+        let calls: [&[&str]; 12] = [
             &["run", input, "-o", "x.mcap"],
             &["run", "good.mpf", "-o", "x.mcap", "-m", input],
             &["time", input],
@@ -45,6 +45,9 @@ fn json_is_one_document_whatever_is_wrong_with_the_input() {
             &["export", input, "-o", "x.csv"],
             &["recover", input, "-o", "x.mcap"],
             &["machine", "check", input],
+            &["compare", input, "good.mpf"],
+            &["report", input, "-o", "x.html"],
+            &["machine", "bode", input],
         ];
         for call in calls {
             let output = sollwert(&folder, &[call, &["--json"]].concat());
@@ -59,6 +62,33 @@ fn json_is_one_document_whatever_is_wrong_with_the_input() {
             }
         }
     }
+}
+
+/// The page of `machine bode` stands alone; the document has every loop; a wrong axis is wrong usage with the right ones.
+#[test]
+fn frequency_responses_as_document_and_page() {
+    let folder = folder("command_bode");
+    let output = sollwert(&folder, &["machine", "bode", "machine.toml", "--axis", "x", "-o", "bode.html", "--json"]);
+    let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for of_loop in ["current", "speed", "position"] {
+        let of_loop = &document["axes"]["X"][of_loop];
+        let points = of_loop["closed"]["frequency_hz"].as_array().map_or(0, Vec::len);
+        assert!(points > 50 && of_loop["stable"] == true, "{of_loop}");
+        assert_eq!(
+            of_loop["open"]["phase_deg"].as_array().map(Vec::len),
+            of_loop["open"]["amplitude"].as_array().map(Vec::len)
+        );
+    }
+    let page = fs::read_to_string(folder.join("bode.html")).expect("the page");
+    assert!(page.contains("<svg") && page.contains("prefers-color-scheme:dark"));
+    assert!(!page.contains("http") && !page.contains("<script") && !page.contains("NaN"));
+    let table = sollwert(&folder, &["machine", "bode", "machine.toml"]);
+    assert!(String::from_utf8_lossy(&table.stdout).contains("Z position"), "all axes without --axis");
+    for wrong in [&["--axis", "Q"][..], &["--from-hz", "-1"], &["-o", "machine.toml"], &["-o", "no/folder/x.html"]] {
+        let output = sollwert(&folder, &[&["machine", "bode", "machine.toml"], wrong].concat());
+        assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", errors_of(&output));
+    }
+    assert!(errors_of(&sollwert(&folder, &["machine", "bode", "machine.toml", "--axis", "Q"])).contains("X, Y, Z"));
 }
 
 #[test]

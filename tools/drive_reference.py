@@ -52,6 +52,12 @@ class Drive:
     gc: float = 0.0
     qpos: float = 0.0
     qmot: float = 0.0
+    Jl: float = 0.0  # of J, behind a spring
+    c: float = 0.0
+    d: float = 0.0
+    at_motor: bool = False  # MD31040 = 0
+    screw: tuple = ()  # start, step, errors
+    comp: tuple = ()
 
 
 MVC_X = Drive(Tp=1e-3, np=8, nv=2, r=12 / math.tau, R=.75, L=6.5e-3, Ke=.43, Kt=1.30, J=.0085, B=.010, Tc=.6, Ts=.6,
@@ -105,6 +111,65 @@ def plant(p, i, w, th, u, Tg, h):
     return i, w, th
 
 
+def two_masses(p, y, u, Tg, h):
+    """One tick of (i, wm, phi, wl, thl): friction, gravity and load act behind the spring."""
+    t, force, Jm = 0.0, 0, p.J - p.Jl
+    y = list(y)
+
+    def spring(y):
+        return p.c * y[2] + p.d * (y[1] - y[3])
+
+    while t < h:
+        if y[3] == 0 and force == 0 and abs(spring(y) - Tg) <= p.Ts:
+            def rest(_, y):
+                return [(u - p.R * y[0] - p.Ke * y[1]) / p.L, (p.Kt * y[0] - spring(y)) / Jm, y[1], 0.0, 0.0]
+
+            def leave(_, y):
+                return abs(spring(y) - Tg) - p.Ts
+            leave.terminal, leave.direction = True, 1
+            s = solve_ivp(rest, (t, h), y, method="DOP853", rtol=1e-12, atol=1e-13, max_step=h / 4, events=leave)
+            y, t = list(s.y[:, -1]), s.t[-1]
+            if s.status == 0:
+                return y
+            force = math.copysign(1, spring(y) - Tg)
+            continue
+        side = force or (math.copysign(1, y[3]) if y[3] else math.copysign(1, spring(y) - Tg))
+        force = 0
+        f = p.Tc * side
+
+        def law(_, y):
+            return [(u - p.R * y[0] - p.Ke * y[1]) / p.L, (p.Kt * y[0] - spring(y)) / Jm, y[1] - y[3],
+                    (spring(y) - p.B * y[3] - f - Tg) / p.Jl, y[3]]
+
+        def stop(_, y):
+            return y[3]
+        stop.terminal, stop.direction = True, -side
+        s = solve_ivp(law, (t, h), y, method="DOP853", rtol=1e-12, atol=1e-13, max_step=h / 4, events=stop)
+        y, t = list(s.y[:, -1]), s.t[-1]
+        if s.status == 0:
+            return y
+        y[3] = 0.0
+    return y
+
+
+def error(table, x):
+    """Linear between equidistant points, the ends hold outside."""
+    if not table:
+        return 0.0
+    start, step, values = table
+    n = min(max((x - start) / step, 0.0), len(values) - 1.0)
+    k = min(math.floor(n), len(values) - 2)
+    return values[k] + (n - k) * (values[k + 1] - values[k])
+
+
+def behind(table, total):
+    """x with x + error(x) = total."""
+    x = total
+    for _ in range(200):
+        x = total - error(table, x)
+    return x
+
+
 class Delay:
     def __init__(self, d, Tp):
         self.n = math.floor(d / Tp)
@@ -124,18 +189,32 @@ def simulate(p, x_set, load, held=True):
     def gravity(th):
         return p.g0 + p.gs * math.sin(p.r * th) + p.gc * math.cos(p.r * th)
 
-    th, w = x_set[0] / p.r, 0.0
+    # The axis measures its first set-point.
+    start = behind(p.comp, x_set[0])
+    th, w = (start if p.at_motor else behind(p.screw, start)) / p.r, 0.0
     hold = gravity(th) if held else 0.0
     i, Iv = hold / p.Kt, hold
     Ii, i_avg, q_th = p.R * i, i, quantise(th, p.qmot)
     D_x, D_v, D_a = Delay(p.dpos, p.Tp), Delay(p.dff, p.Tp), Delay(p.dff, p.Tp)
     x_old, v_old, rows = x_set[0], 0.0, []
+    if p.Jl:
+        phi = hold / p.c
+        y = [i, 0.0, phi, 0.0, th - phi if p.at_motor else th]
+        th = y[4] + y[2]
+
+    def load_angle():
+        return y[4] if p.Jl else th
+
+    def position():
+        nominal = p.r * load_angle()
+        return nominal + error(p.screw, nominal)
     for k, xs in enumerate(x_set):
         v = (xs - x_old) / p.Tp
         a = (v - v_old) / p.Tp
         x_old, v_old = xs, v
         x_ref, v_ff, t_ff = D_x(xs), p.kvff * D_v(v), p.ktff * p.Jff * D_a(a) / p.r
-        x_meas = quantise(p.r * th, p.qpos)
+        x_meas = quantise(p.r * th if p.at_motor else position(), p.qpos)
+        x_meas += error(p.comp, x_meas)
         e_fol = x_ref - x_meas
         v_un = p.Kv * e_fol + v_ff
         w_ref = clamp(v_un, p.vmax) / p.r
@@ -160,15 +239,20 @@ def simulate(p, x_set, load, held=True):
             u = clamp(u_un, p.umax)
             if u == u_un or ei * u_un < 0:
                 Ii += dI
-            Tg = gravity(th) + load(k)
+            Tg = gravity(load_angle()) + load(k)
             if n == 0:
-                drive = p.Kt * i - Tg
-                t_fric = p.Tc * math.copysign(1, w) + p.B * w if w else clamp(drive, p.Ts)
+                wl = y[3] if p.Jl else w
+                drive = (p.c * y[2] + p.d * (y[1] - y[3]) if p.Jl else p.Kt * i) - Tg
+                t_fric = p.Tc * math.copysign(1, wl) + p.B * wl if wl else clamp(drive, p.Ts)
                 flags = (v_un != clamp(v_un, p.vmax)) + 2 * t_clamped + 4 * (u != u_un)
-                flags += 8 * (w == 0 and p.Ts > 0 and abs(drive) <= p.Ts)
-                rows.append((p.r * th, x_meas, e_fol, w, i, i_avg, u, t_ref, t_fric, flags))
+                flags += 8 * (wl == 0 and p.Ts > 0 and abs(drive) <= p.Ts)
+                rows.append((position(), x_meas, e_fol, w, i, i_avg, u, t_ref, t_fric, flags))
             samples.append(i)
-            i, w, th = plant(p, i, w, th, u, Tg, Ti)
+            if p.Jl:
+                y = two_masses(p, y, u, Tg, Ti)
+                i, w, th = y[0], y[1], y[4] + y[2]
+            else:
+                i, w, th = plant(p, i, w, th, u, Tg, Ti)
         i_avg = sum(samples) / len(samples)
     return rows
 
@@ -191,6 +275,14 @@ def cases():
     # Tilting table, cold start, both encoders quantised, negative transmission.
     yield ("tilt", replace(UCP_A, r=-1 / 120, kvff=1, Ts=.9, qpos=2e-6, qmot=2e-4),
            [.3 + .05 * (1 - math.cos(math.tau * 4 * k * 2e-3)) for k in range(131)], none, False, 4)
+    # A load behind a spring (anti-resonance 71 Hz, resonance 112 Hz), vertical, with stops, breakaways and a load that comes and goes.
+    yield ("two_mass", replace(MVC_X, kvff=1, Ts=.9, g0=.5, Jl=.0051, c=1000, d=.03),
+           [.3 * math.sin(math.tau * 5 * k * 1e-3) for k in range(301)], lambda k: 1.0 if 150 <= k < 170 else 0.0, True, 6)
+    # Measured at the motor, screw with an error, compensated for the most part; the spring winds up.
+    yield ("screw", replace(MVC_X, kvff=1, at_motor=True, Jl=.004, c=6000, d=.05,
+                            screw=(-4.0, 1.5, (2e-3, 5e-3, -3e-3, 1e-3, 4e-3, 0.0)),
+                            comp=(-4.0, 3.0, (2e-3, -2e-3, 3e-3))),
+           [-5.0 + 6.0 * (1 - math.cos(math.tau * 2 * k * 1e-3)) for k in range(401)], none, True, 8)
 
 
 def main():

@@ -12,9 +12,10 @@
 //! | `_deg`, `_deg_s`, `_rpm`, `_rot`, `_rot_s2`, `_rot_s3` | customary units of rotation: borders only |
 //! | `_um`, `_m`, `_m_min`, `_m_s2`, `_m_s3`, `_mm_min`, `_inch`, `_mh` | other customary units: borders only |
 //! | `_n_m`, `_kg_m2`, `_a`, `_v`, `_ohm`, `_h` | torque, inertia, current, voltage, resistance, inductance |
+//! | `_n`, `_kg` | force and mass of a linear motor, whose radian is a metre |
 //! | `_lu2_s2` | square of a speed |
 //! | `_per_s`, `_per_s2`, `_per_mm` | 1/s, 1/s², 1/mm (curvature) |
-//! | `_share`, `_ratio`, `_percent` | dimensionless |
+//! | `_share`, `_ratio`, `_percent`, `_db` | dimensionless; a ratio of amplitudes in decibel: borders only |
 //!
 //! Products and quotients are written out: `_n_m_s_per_rad`, `_v_per_a`. `tests/tidy.rs` reads the list from this table.
 
@@ -53,6 +54,11 @@ pub fn percent_from_ratio(value_ratio: f64) -> f64 {
 /// 100 % -> 1.
 pub fn ratio_from_percent(value_percent: f64) -> f64 {
     value_percent / 100.0
+}
+
+/// Ratio of amplitudes -> decibel.
+pub fn db_from_ratio(amplitude_ratio: f64) -> f64 {
+    20.0 * amplitude_ratio.log10()
 }
 
 /// m/min -> mm/s.
@@ -98,6 +104,11 @@ pub fn deg_from_rad(angle_rad: f64) -> f64 {
 /// µm -> mm.
 pub fn mm_from_um(length_um: f64) -> f64 {
     length_um / UM_PER_MM
+}
+
+/// µm -> m.
+pub fn m_from_um(length_um: f64) -> f64 {
+    length_um / UM_PER_MM / MM_PER_M
 }
 
 /// mm -> inch.

@@ -2,6 +2,7 @@
 //!
 //! In: a machine file or the name of a shipped one. Out: verdict, overview, schema or text. Does not run anything.
 
+use super::bode::{BodeArguments, bode};
 use super::failure::Failure;
 use super::inputs::{MachineChoice, refused};
 use super::output::{print, print_json, show, table};
@@ -44,6 +45,8 @@ enum Action {
         #[arg(long)]
         json: bool,
     },
+    /// Frequency responses of the loops of an axis: margins, bandwidths, curves
+    Bode(BodeArguments),
     /// The text of a machine file with --set applied: a shipped one is a good start for your own
     #[command(after_help = "Example:\n  sollwert machine show -m spinner_mvc850 > my_machine.toml")]
     Show {
@@ -59,6 +62,7 @@ impl MachineArguments {
     /// Whether a JSON document is wanted.
     pub(super) fn json(&self) -> bool {
         match &self.action {
+            Action::Bode(arguments) => arguments.json,
             Action::Check { json, .. }
             | Action::Schema { json }
             | Action::List { json }
@@ -72,6 +76,7 @@ pub(super) fn machine(arguments: &MachineArguments) -> Result<(), Failure> {
         Action::Check { machine, sets, json } => check(machine, sets, *json),
         Action::Schema { .. } => print_json(&schema()),
         Action::List { json } => list(*json),
+        Action::Bode(arguments) => bode(arguments),
         Action::Show { machine, json } => {
             let loaded = machine.load()?;
             if *json {

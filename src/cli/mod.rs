@@ -3,7 +3,11 @@
 //! In: command line. Out: tables or one JSON document on stdout, findings and progress on stderr, exit code 0 (done), 1 (the work
 //! found something wrong) or 2 (wrong usage, unreadable input, output that cannot be written). No physics here.
 
+mod bode;
+mod bode_page;
 mod check;
+mod compare;
+mod compare_tables;
 mod demo;
 mod explain;
 mod export;
@@ -15,6 +19,7 @@ mod moves;
 mod output;
 mod recorded;
 mod recover;
+mod report;
 mod run;
 mod time;
 mod what_if;
@@ -56,11 +61,15 @@ enum Command {
     Moves(moves::MovesArguments),
     /// The drives alone, fed with given position set-points
     Follow(follow::FollowArguments),
+    /// Two traces, aligned: figures per signal, contour error, circles, corners; limits decide the exit code
+    Compare(compare::CompareArguments),
+    /// A trace as a page to look at: plots, path, tables, program
+    Report(report::ReportArguments),
     /// A recording as CSV
     Export(export::ExportArguments),
     /// Rescue what an interrupted run left
     Recover(recover::RecoverArguments),
-    /// Machine files: check, list, show, schema
+    /// Machine files: check, list, show, schema, frequency responses
     Machine(machine::MachineArguments),
     /// What a code such as E0104 means, and what to do
     Explain(explain::ExplainArguments),
@@ -80,6 +89,8 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => (check::check(arguments), arguments.json),
         Command::Moves(arguments) => (moves::moves(arguments), arguments.json),
         Command::Follow(arguments) => (follow::follow(arguments), arguments.json),
+        Command::Compare(arguments) => (compare::compare(arguments), arguments.json),
+        Command::Report(arguments) => (report::report(arguments), arguments.json),
         Command::Export(arguments) => (export::export(arguments), arguments.json),
         Command::Recover(arguments) => (recover::recover(arguments), arguments.json),
         Command::Machine(arguments) => (machine::machine(arguments), arguments.json()),

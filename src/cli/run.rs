@@ -6,6 +6,7 @@ use super::failure::Failure;
 use super::inputs::{MachineChoice, Panel, Surroundings, default_recording, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show, table};
 use super::recorded::Recorded;
+use super::report::write_of_recording;
 use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome, RunSummary};
 use crate::recorder::SignalChoice;
@@ -27,6 +28,9 @@ pub(super) struct RunArguments {
     /// Recording to write; default: the program's name with .mcap, in the current folder
     #[arg(short, long, value_name = "TRACE.mcap")]
     output: Option<PathBuf>,
+    /// Page with plots, path and figures to write as well (`sollwert report` of the recording)
+    #[arg(long, value_name = "R.html")]
+    report: Option<PathBuf>,
     /// Set-points only: every axis is ideal
     #[arg(long)]
     no_drives: bool,
@@ -59,6 +63,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let recording = arguments.output.clone().unwrap_or_else(|| default_recording(&arguments.program));
     let inputs = [arguments.program.as_path()].into_iter().chain(arguments.machine.path());
     refuse_same_file(inputs.chain(arguments.surroundings.workshop_files()), &recording)?;
+    check_page(arguments, &recording)?;
     let mut signals = arguments.recorded.signals(&machine)?.until_rest(arguments.record_to_rest);
     if arguments.no_drives {
         // Without drives every wire behind the set-point is a copy of it: only what was computed is recorded.
@@ -81,13 +86,29 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     });
     drop(line);
     let outcome = outcome.map_err(|error| Failure::unreadable(error.0))?;
-    report(&outcome, Some(&recording), &Style { json: arguments.json, drives: !arguments.no_drives })
+    // The page first: the document on stdout names it only when it is there. A run that an alarm ended has one, too.
+    let page = arguments.report.as_ref().map(|page| write_of_recording(&recording, page).map(|_| page)).transpose()?;
+    let style = Style { json: arguments.json, drives: !arguments.no_drives, page: page.cloned() };
+    report(&outcome, Some(&recording), &style)
+}
+
+/// The page must not be an input or the recording.
+fn check_page(arguments: &RunArguments, recording: &std::path::Path) -> Result<(), Failure> {
+    let Some(page) = &arguments.report else { return Ok(()) };
+    let inputs = [arguments.program.as_path(), recording].into_iter().chain(arguments.machine.path());
+    if page == recording {
+        let finding = Diagnostic::error("C0001", format!("`{}` is both recording and page", page.display()));
+        return Err(Failure::unreadable(finding.help("give another name to --report")));
+    }
+    refuse_same_file(inputs.chain(arguments.surroundings.workshop_files()), page)
 }
 
 /// How to show an outcome.
 pub(super) struct Style {
     pub(super) json: bool,
     pub(super) drives: bool,
+    /// The page that was written.
+    pub(super) page: Option<PathBuf>,
 }
 
 /// Findings to stderr, figures to stdout; exit code 1 on an alarm.
@@ -105,7 +126,11 @@ pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &
         show([&Diagnostic::note("K0004", message)]);
     }
     if style.json {
-        print_json(&document(&outcome.summary, recording))?;
+        let mut document = document(&outcome.summary, recording);
+        if let Some(page) = &style.page {
+            document["report"] = json!(page.display().to_string());
+        }
+        print_json(&document)?;
     } else {
         print(&figures_text(&outcome.summary, style))?;
         if let (Some(path), Some(recorded)) = (recording, &outcome.recording) {
@@ -115,6 +140,9 @@ pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &
                 recorded.bytes as f64 / 1e6,
                 path.display()
             ))?;
+        }
+        if let Some(page) = &style.page {
+            print(&format!("page: {}\n", page.display()))?;
         }
     }
     if outcome.alarm.is_some() { Err(Failure::told()) } else { Ok(()) }

@@ -10,10 +10,12 @@ use super::encoder::{MotorEncoder, PositionEncoder};
 use super::feedforward::{Feedforward, Terms};
 use super::jerk_filter::JerkFilter;
 use super::monitor::{Monitor, View};
+use super::pitch_error::PitchError;
 use super::plant::{Plant, PlantState};
 use super::position_loop::{PositionLoop, SpeedCommand};
 use super::reversal::{Correction, Reversal};
-use super::speed_loop::{SpeedLoop, TorqueCommand};
+use super::second_mass::{TwoMass, TwoMassState};
+use super::speed_loop::{SpeedLaw, SpeedLoop, TorqueCommand};
 use super::wire::{AxisSignals, Start, flags};
 use crate::base::TimeBase;
 use crate::machine::{Axis, PositionSource};
@@ -41,7 +43,12 @@ pub struct AxisDrive {
     speed_loop: SpeedLoop,
     current_loop: CurrentLoop,
     plant: Plant,
+    /// i, w, th of the motor.
     state: PlantState,
+    /// The load behind a spring; boxed, as most axes have none.
+    second_mass: Option<Box<SecondMass>>,
+    /// Boxed as the second mass is.
+    pitch_error: Option<Box<PitchError>>,
     backlash: Option<Backlash>,
     monitor: Monitor,
     /// MD31040 = 0: the position is that of the motor.
@@ -62,14 +69,49 @@ pub struct AxisDrive {
     current_mean_a: f64,
 }
 
+/// Motor, spring and load, and their state.
+#[derive(Clone, Debug)]
+struct SecondMass {
+    plant: TwoMass,
+    state: TwoMassState,
+}
+
 /// Wires around the position loop.
 #[derive(Clone, Copy)]
-struct Position {
+pub(super) struct Position {
     /// x_ref.
     reference_lu: f64,
     /// x_meas.
     measured_lu: f64,
-    command: SpeedCommand,
+    pub(super) command: SpeedCommand,
+}
+
+/// What a position cycle begins with.
+struct Beginning {
+    terms: Terms,
+    correction: Correction,
+    position: Position,
+    view: View,
+}
+
+/// What holds in a position cycle of a plain axis.
+#[derive(Clone, Copy)]
+pub(super) struct Prepared {
+    input: DriveInput,
+    pub(super) terms: Terms,
+    pub(super) position: Position,
+    view: View,
+    /// Gravity and outside load.
+    pub(super) gravity_n_m: f64,
+}
+
+/// The inner boxes of an axis whose speed loop, current loop and plant are all there is between two position cycles.
+pub(super) struct PlainParts {
+    pub(super) speed_ticks: u32,
+    pub(super) current_ticks: u32,
+    pub(super) speed_law: SpeedLaw,
+    pub(super) current_loop: CurrentLoop,
+    pub(super) plant: Plant,
 }
 
 /// All wires at one tick, by the box that drives them.
@@ -92,27 +134,44 @@ impl AxisDrive {
         let current_period_s = time_base.seconds(data.current_cycle_ticks);
         let transmission_lu_per_rad = data.mechanics.transmission_lu_per_rad;
         let plant = Plant::new(data, current_period_s);
-        let angle_rad = position_lu / transmission_lu_per_rad;
+        let pitch_error = PitchError::new(data).map(Box::new);
+        // The axis measures the first set-point when it starts.
+        let nominal_lu = pitch_error.as_ref().map_or(position_lu, |error| error.nominal_lu(position_lu));
+        let angle_rad = nominal_lu / transmission_lu_per_rad;
         // Held: motor torque, both integrators and the current balance gravity. Cold: all of them are empty.
         let torque_n_m = match start {
             Start::Held => plant.gravity_n_m(angle_rad),
             Start::Cold => 0.0,
         };
         let current_a = torque_n_m / data.motor.torque_constant_n_m_per_a;
+        let motor_measures = data.encoder.position_source == PositionSource::Motor;
+        let second_mass = TwoMass::new(data, current_period_s).map(|plant| {
+            let state = plant.held(torque_n_m, angle_rad, motor_measures);
+            Box::new(SecondMass { plant, state })
+        });
+        let state = match &second_mass {
+            Some(second) => second.state.motor(),
+            None => PlantState { current_a, speed_rad_s: 0.0, angle_rad },
+        };
         Some(Self {
             jerk_filter: JerkFilter::new(&data.options.jerk_filter, position_period_s, position_lu),
             feedforward: Feedforward::new(data, position_period_s, position_lu),
             reversal: Reversal::new(&data.options, position_period_s),
             position_encoder: PositionEncoder::new(data),
             position_loop: PositionLoop::new(data),
-            motor_encoder: MotorEncoder::new(data, speed_period_s, angle_rad),
+            motor_encoder: MotorEncoder::new(data, speed_period_s, state.angle_rad),
             speed_loop: SpeedLoop::new(data, speed_period_s, torque_n_m),
             current_loop: CurrentLoop::new(data, current_period_s, data.motor.resistance_ohm * current_a),
             plant,
-            state: PlantState { current_a, speed_rad_s: 0.0, angle_rad },
+            state,
+            second_mass,
+            backlash: Backlash::new(
+                data.mechanics.backlash_lu,
+                pitch_error.as_ref().map_or(position_lu, |error| error.load_lu(nominal_lu)),
+            ),
+            pitch_error,
             monitor: Monitor::new(data, position_period_s, position_lu),
-            backlash: Backlash::new(data.mechanics.backlash_lu, position_lu),
-            motor_measures: data.encoder.position_source == PositionSource::Motor,
+            motor_measures,
             stiffness_control: data.options.stiffness_control,
             reference_before_lu: position_lu,
             transmission_lu_per_rad,
@@ -142,17 +201,8 @@ impl AxisDrive {
     /// The diagram, from left to right.
     #[inline(always)]
     fn cycle(&mut self, input: DriveInput, mut observe: impl FnMut(u32, &Self, &Wires)) {
-        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
-        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
-        let correction = self.reversal.step(terms.set_velocity_lu_s);
-        let mut position = self.position_control(terms.reference_lu, &terms, &correction);
-
-        let view = self.monitor.watch(input.position_setpoint_lu, position.measured_lu);
-
+        let Beginning { terms, correction, mut position, view } = self.begin(&input);
         let speed_period_s = self.position_period_s / f64::from(self.speed_ticks);
-        if !self.stiffness_control {
-            self.monitor.advance(position.reference_lu, terms.velocity_lu_s, self.position_period_s);
-        }
 
         let mut tick = 0;
         let mut current_sum_a = 0.0;
@@ -167,13 +217,10 @@ impl AxisDrive {
 
             for _ in 0..self.current_ticks {
                 let voltage = self.current_loop.step(torque.current_a - self.state.current_a);
-                let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
+                let gravity_n_m = self.plant.gravity_n_m(self.load_angle_rad()) + input.load_n_m;
                 observe(tick, self, &Wires { input, terms, position, view, torque, gravity_n_m, voltage });
                 current_sum_a += self.state.current_a;
-                self.state = self.plant.step(self.state, voltage.voltage_v, gravity_n_m);
-                if let Some(backlash) = &mut self.backlash {
-                    backlash.follow(self.transmission_lu_per_rad * self.state.angle_rad);
-                }
+                self.move_on(voltage.voltage_v, gravity_n_m);
                 tick += 1;
             }
         }
@@ -181,11 +228,71 @@ impl AxisDrive {
         self.current_mean_a = current_sum_a / f64::from(tick);
     }
 
+    /// What stands before the speed loop: set-point preparation, position loop, monitoring.
+    #[inline(always)]
+    fn begin(&mut self, input: &DriveInput) -> Beginning {
+        let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
+        let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
+        let correction = self.reversal.step(terms.set_velocity_lu_s);
+        let position = self.position_control(terms.reference_lu, &terms, &correction);
+        let view = self.monitor.watch(input.position_setpoint_lu, position.measured_lu);
+        if !self.stiffness_control {
+            self.monitor.advance(position.reference_lu, terms.velocity_lu_s, self.position_period_s);
+        }
+        Beginning { terms, correction, position, view }
+    }
+
+    /// The inner boxes; `None`: the axis has something besides, and goes alone (see `batch`).
+    pub(super) fn plain_parts(&self) -> Option<PlainParts> {
+        let plain = self.speed_loop.is_plain()
+            && self.motor_encoder.is_ideal()
+            && !self.stiffness_control
+            && !self.plant.gravity_turns
+            && self.second_mass.is_none()
+            && self.pitch_error.is_none()
+            && self.backlash.is_none();
+        plain.then_some(PlainParts {
+            speed_ticks: self.speed_ticks,
+            current_ticks: self.current_ticks,
+            speed_law: self.speed_loop.law,
+            current_loop: self.current_loop,
+            plant: self.plant,
+        })
+    }
+
+    /// The beginning of a position cycle of a plain axis.
+    pub(super) fn prepare(&mut self, input: DriveInput) -> Prepared {
+        let Beginning { terms, position, view, .. } = self.begin(&input);
+        let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
+        Prepared { input, terms, position, view, gravity_n_m }
+    }
+
+    /// The signals at the first tick of a plain axis.
+    pub(super) fn signals_of(&self, ready: &Prepared, torque: TorqueCommand, voltage: VoltageCommand) -> AxisSignals {
+        let Prepared { input, terms, position, view, gravity_n_m } = *ready;
+        self.signals(&Wires { input, terms, position, view, torque, gravity_n_m, voltage })
+    }
+
+    /// State, Iv, Ii.
+    pub(super) fn memories(&self) -> (PlantState, f64, f64) {
+        (self.state, self.speed_loop.law.integral_n_m, self.current_loop.integral_v)
+    }
+
+    /// The end of a position cycle whose ticks ran in a batch.
+    pub(super) fn finish(&mut self, ready: &Prepared, memories: (PlantState, f64, f64), current_sum_a: f64) {
+        (self.state, self.speed_loop.law.integral_n_m, self.current_loop.integral_v) = memories;
+        self.reference_before_lu = ready.terms.reference_lu;
+        self.current_mean_a = current_sum_a / f64::from(self.ticks_per_step());
+    }
+
     /// Encoder, position loop and what is added to its output.
     #[inline(always)]
     fn position_control(&self, reference_lu: f64, terms: &Terms, correction: &Correction) -> Position {
         let from_lu = if self.motor_measures { self.motor_lu() } else { self.load_lu() };
-        let measured_lu = self.position_encoder.measured_lu(from_lu) + correction.position_lu;
+        let mut measured_lu = self.position_encoder.measured_lu(from_lu) + correction.position_lu;
+        if let Some(error) = &self.pitch_error {
+            measured_lu += error.correction_lu(measured_lu);
+        }
         let added_lu_s = terms.velocity_lu_s + correction.velocity_lu_s;
         Position { reference_lu, measured_lu, command: self.position_loop.step(reference_lu, measured_lu, added_lu_s) }
     }
@@ -194,6 +301,43 @@ impl AxisDrive {
     fn reference_lu(&self, speed_tick: u32, terms: &Terms) -> f64 {
         let left_ratio = f64::from(self.speed_ticks - 1 - speed_tick) / f64::from(self.speed_ticks);
         terms.reference_lu + left_ratio * (self.reference_before_lu - terms.reference_lu)
+    }
+
+    /// Motor and mechanics over one current cycle.
+    #[inline(always)]
+    fn move_on(&mut self, voltage_v: f64, gravity_n_m: f64) {
+        match &mut self.second_mass {
+            None => self.state = self.plant.step(self.state, voltage_v, gravity_n_m),
+            Some(second) => {
+                second.state = second.plant.step(second.state, voltage_v, gravity_n_m);
+                self.state = second.state.motor();
+            }
+        }
+        if self.backlash.is_some() {
+            let before_play_lu = self.before_play_lu();
+            if let Some(backlash) = &mut self.backlash {
+                backlash.follow(before_play_lu);
+            }
+        }
+    }
+
+    /// Where the nut is, or the gear: behind spring and screw.
+    #[inline(always)]
+    fn before_play_lu(&self) -> f64 {
+        let nominal_lu = self.transmission_lu_per_rad * self.load_angle_rad();
+        match &self.pitch_error {
+            None => nominal_lu,
+            Some(error) => error.load_lu(nominal_lu),
+        }
+    }
+
+    /// The load's angle at the motor shaft: behind the spring, if there is one.
+    #[inline(always)]
+    fn load_angle_rad(&self) -> f64 {
+        match &self.second_mass {
+            None => self.state.angle_rad,
+            Some(second) => second.state.load_angle_rad,
+        }
     }
 
     /// r th: the motor on the load side.
@@ -207,7 +351,7 @@ impl AxisDrive {
     fn load_lu(&self) -> f64 {
         match &self.backlash {
             Some(backlash) => backlash.load_lu(),
-            None => self.motor_lu(),
+            None => self.before_play_lu(),
         }
     }
 
@@ -218,6 +362,7 @@ impl AxisDrive {
         current_a.is_finite()
             && speed_rad_s.is_finite()
             && angle_rad.is_finite()
+            && self.second_mass.as_ref().is_none_or(|second| second.state.is_finite())
             && self.speed_loop.is_finite()
             && self.current_loop.is_finite()
     }
@@ -227,7 +372,12 @@ impl AxisDrive {
         &self.plant
     }
 
-    /// i, w, th at the start of the next tick.
+    /// State of motor, spring and load at the start of the next tick; `None` for a rigid axis.
+    pub fn two_mass_state(&self) -> Option<TwoMassState> {
+        self.second_mass.as_ref().map(|second| second.state)
+    }
+
+    /// i, w, th of the motor at the start of the next tick.
     pub fn state(&self) -> PlantState {
         self.state
     }
@@ -241,12 +391,24 @@ impl AxisDrive {
     fn signals(&self, wires: &Wires) -> AxisSignals {
         let Wires { input, terms, position, view, torque, gravity_n_m, voltage } = wires;
         let (speed, position_lu) = (&position.command, self.load_lu());
+        let (sticks, friction_torque_n_m, load_speed_rad_s) = match &self.second_mass {
+            None => {
+                let friction_n_m = self.plant.friction_n_m(self.state, *gravity_n_m);
+                (self.plant.sticks(self.state, *gravity_n_m), friction_n_m, self.state.speed_rad_s)
+            }
+            Some(second) => {
+                let friction_n_m = second.plant.friction_n_m(&second.state, *gravity_n_m);
+                (second.plant.sticks(&second.state, *gravity_n_m), friction_n_m, second.state.load_speed_rad_s)
+            }
+        };
+        let nominal_lu = self.transmission_lu_per_rad * self.load_angle_rad();
+        let slope_ratio = self.pitch_error.as_ref().map_or(1.0, |error| error.velocity_ratio(nominal_lu));
         let mut bits = 0;
         for (set, flag) in [
             (speed.clamped, flags::SPEED_CLAMP),
             (torque.clamped, flags::CURRENT_LIMIT),
             (voltage.clamped, flags::VOLTAGE_LIMIT),
-            (self.plant.sticks(self.state, *gravity_n_m), flags::STUCK),
+            (sticks, flags::STUCK),
         ] {
             bits |= if set { flag } else { 0 };
         }
@@ -259,12 +421,12 @@ impl AxisDrive {
             following_error_lu: input.position_setpoint_lu - position_lu,
             velocity_command_lu_s: speed.velocity_lu_s,
             velocity_feedforward_lu_s: terms.velocity_lu_s,
-            velocity_actual_lu_s: self.transmission_lu_per_rad * self.state.speed_rad_s,
+            velocity_actual_lu_s: self.transmission_lu_per_rad * load_speed_rad_s * slope_ratio,
             motor_speed_reference_rad_s: speed.motor_speed_rad_s,
             motor_speed_rad_s: self.state.speed_rad_s,
             torque_reference_n_m: torque.torque_n_m,
             torque_feedforward_n_m: terms.torque_n_m,
-            friction_torque_n_m: self.plant.friction_n_m(self.state, *gravity_n_m),
+            friction_torque_n_m,
             gravity_torque_n_m: *gravity_n_m,
             current_reference_a: torque.current_a,
             current_a: self.state.current_a,

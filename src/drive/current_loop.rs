@@ -16,16 +16,16 @@ pub(super) struct VoltageCommand {
 }
 
 /// The boxes "PI Kpi, Tni" and "clamp ±u_max".
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct CurrentLoop {
     /// Kpi.
-    gain_v_per_a: f64,
+    pub(super) gain_v_per_a: f64,
     /// Kpi T_i / Tni.
-    integral_gain_v_per_a: f64,
+    pub(super) integral_gain_v_per_a: f64,
     /// u_max.
-    voltage_max_v: f64,
+    pub(super) voltage_max_v: f64,
     /// Ii.
-    integral_v: f64,
+    pub(super) integral_v: f64,
 }
 
 impl CurrentLoop {
@@ -46,9 +46,17 @@ impl CurrentLoop {
         let voltage_v = limited(wanted_v, self.voltage_max_v);
         let clamped = wanted_v.abs() > self.voltage_max_v;
         // Anti-windup as in the speed loop.
-        let integrates = !clamped || current_error_a * wanted_v < 0.0;
+        let integrates = !clamped | (current_error_a * wanted_v < 0.0);
         self.integral_v += if integrates { increment_v } else { 0.0 };
         VoltageCommand { voltage_v, clamped }
+    }
+
+    /// What the box remembers from cycle to cycle.
+    pub(super) fn memory<'a>(&'a mut self, list: &mut Vec<&'a mut f64>) {
+        // Without an integral part (Tni infinite) the integral is a constant.
+        if self.integral_gain_v_per_a != 0.0 {
+            list.push(&mut self.integral_v);
+        }
     }
 
     /// The integral is a number.

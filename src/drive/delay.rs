@@ -3,6 +3,8 @@
 //! In: one sample a position cycle. Out: the sample of `delay_s` ago, linear between two cycles. Memory is taken once, at
 //! construction. Does not interpolate better than linearly: that is what the balancing of a control does.
 
+use nalgebra::Complex;
+
 /// Longest delay in position cycles (17 minutes at 1 ms); machine files are limited to a second. A longer one is cut to this.
 const CYCLES_MAX: f64 = 1_048_576.0;
 
@@ -36,6 +38,12 @@ impl DelayLine {
         let f = self.fraction_ratio;
         // f = 0 must give the sample itself, also where the older one is not finite.
         if f == 0.0 { self.samples[newer] } else { (1.0 - f) * self.samples[newer] + f * self.samples[older] }
+    }
+
+    /// Response to a sine with one cycle of delay being `q` = 1/z: ((1-f) + f q) q^n.
+    pub(super) fn response(&self, q: Complex<f64>) -> Complex<f64> {
+        let whole = (self.samples.len() - 2) as u32;
+        (q * self.fraction_ratio + (1.0 - self.fraction_ratio)) * q.powu(whole)
     }
 }
 

@@ -44,6 +44,11 @@ impl MotorEncoder {
         Self { resolution_rad, speed_period_s, angle_before_rad }
     }
 
+    /// It measures the speed as it is, and remembers nothing.
+    pub(super) fn is_ideal(&self) -> bool {
+        self.resolution_rad == 0.0
+    }
+
     /// w_meas, at the speed cycle: the true speed, or the difference quotient of the quantised angle.
     #[inline]
     pub(super) fn measured_speed_rad_s(&mut self, state: PlantState) -> f64 {

@@ -6,6 +6,7 @@
 
 use super::delay::DelayLine;
 use crate::machine::{Balancing, DriveData};
+use nalgebra::Complex;
 
 /// What the loops get in one position cycle.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +50,13 @@ impl Balance {
             }
         }
     }
+
+    fn response(&self, q: Complex<f64>) -> Complex<f64> {
+        match self {
+            Self::DeadTime(line) => line.response(q),
+            Self::Pt1 { share_ratio, .. } => *share_ratio / (-q * (1.0 - share_ratio) + 1.0),
+        }
+    }
 }
 
 /// The boxes "d/dt", "d²/dt²" and "delay".
@@ -80,6 +88,18 @@ impl Feedforward {
             velocity_delay: DelayLine::new(data.feedforward_delay_s, period_s, 0.0),
             acceleration_delay: DelayLine::new(data.feedforward_delay_s, period_s, 0.0),
         }
+    }
+
+    /// From set-point to x_ref, v_ff and t_ff, for a sine with one cycle of delay being `q` = 1/z and feed-forward active.
+    pub(super) fn responses(&self, q: Complex<f64>) -> [Complex<f64>; 3] {
+        let difference = (-q + 1.0) / self.period_s;
+        let velocity = difference * self.velocity_delay.response(q);
+        let acceleration = difference * difference * self.acceleration_delay.response(q);
+        [
+            self.setpoint_balance.response(q),
+            velocity * self.velocity_weight_ratio,
+            acceleration * self.torque_by_acceleration_n_m_s2_per_lu,
+        ]
     }
 
     /// One position cycle. `active = false` (FFWOF): both weights are 0 in this cycle; the delay lines go on, so that FFWON

@@ -6,6 +6,7 @@
 
 use crate::base::units::RAD_PER_REV;
 use crate::machine::{Filter, FilterShape};
+use nalgebra::Complex;
 
 /// One discrete section: y = b0 x + b1 x\[k-1\] + b2 x\[k-2\] - a1 y\[k-1\] - a2 y\[k-2\], transposed so that it keeps two values.
 #[derive(Clone, Debug)]
@@ -65,6 +66,18 @@ impl Section {
         self.memory[1] = b2 * above - a2 * filtered;
         self.resting + filtered
     }
+
+    /// What the section remembers from cycle to cycle.
+    pub(super) fn memory<'a>(&'a mut self, list: &mut Vec<&'a mut f64>) {
+        list.extend(&mut self.memory);
+    }
+
+    /// Response to a sine with one cycle of delay being `q` = 1/z.
+    pub(super) fn response(&self, q: Complex<f64>) -> Complex<f64> {
+        let [b0, b1, b2] = self.forward_ratio;
+        let [a1, a2] = self.back_ratio;
+        (q * (q * b2 + b1) + b0) / (q * (q * a2 + a1) + 1.0)
+    }
 }
 
 /// Sections one after the other; none is a wire.
@@ -81,5 +94,15 @@ impl Chain {
     #[inline(always)]
     pub(super) fn step(&mut self, sample: f64) -> f64 {
         self.0.iter_mut().fold(sample, |sample, section| section.step(sample))
+    }
+
+    /// A wire.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// What its sections remember from cycle to cycle.
+    pub(super) fn memory<'a>(&'a mut self, list: &mut Vec<&'a mut f64>) {
+        self.0.iter_mut().for_each(|section| section.memory(list));
     }
 }

@@ -5,6 +5,7 @@
 
 use super::filter::Section;
 use crate::machine::{Filter, FilterShape, JerkFilter as Data, JerkFilterKind};
+use nalgebra::Complex;
 
 /// Mean of the last samples.
 #[derive(Clone, Debug)]
@@ -28,6 +29,12 @@ impl MovingAverage {
         // Differences to the newest: a set-point at rest keeps its bits, and no running sum drifts.
         let below: f64 = self.samples.iter().map(|before| before - sample).sum();
         sample + below / self.samples.len() as f64
+    }
+
+    /// Mean of 1, q, q², ...
+    fn response(&self, q: Complex<f64>) -> Complex<f64> {
+        let sum = (0..self.samples.len()).fold(Complex::new(0.0, 0.0), |sum, _| sum * q + 1.0);
+        sum / self.samples.len() as f64
     }
 }
 
@@ -65,6 +72,16 @@ impl JerkFilter {
             Self::Section(section) => section.step(setpoint_lu),
             Self::Average(average) => average.step(setpoint_lu),
             Self::Double(first, second) => second.step(first.step(setpoint_lu)),
+        }
+    }
+
+    /// Response to a sine with one cycle of delay being `q` = 1/z.
+    pub(super) fn response(&self, q: Complex<f64>) -> Complex<f64> {
+        match self {
+            Self::Off => Complex::new(1.0, 0.0),
+            Self::Section(section) => section.response(q),
+            Self::Average(average) => average.response(q),
+            Self::Double(first, second) => first.response(q) * second.response(q),
         }
     }
 }

@@ -8,11 +8,13 @@
 //!        └─ feedforward: v_ff into the position loop's output, t_ff into the speed loop's output
 //! ```
 //!
-//! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal` and
-//! `backlash`. `axis_drive` wires the boxes; `choice` lets the kernel treat an axis without drive data (`ideal`) alike. `docs/drive.md` has
+//! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal`,
+//! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `batch` steps
+//! many drives at once. `docs/drive.md` has
 //! picture, law and code side by side.
 
 mod axis_drive;
+mod batch;
 mod backlash;
 mod choice;
 mod current_loop;
@@ -20,19 +22,27 @@ mod delay;
 mod encoder;
 mod feedforward;
 mod filter;
+mod frequency;
 mod ideal;
+mod integral;
 mod jerk_filter;
 mod limit;
+mod linear_model;
 mod monitor;
+mod pitch_error;
 mod plant;
 mod position_loop;
 mod reversal;
+mod second_mass;
 mod speed_loop;
 mod transition;
 mod wire;
 
 pub use axis_drive::{AxisDrive, DriveInput};
+pub use batch::DriveBatch;
 pub use choice::Drive;
+pub use frequency::{FrequencyResponses, GainMargin, LOWEST_HZ, LoopResponse, PhaseMargin, Point, frequency_responses};
 pub use ideal::IdealDrive;
 pub use plant::{Piece, Plant, PlantState};
+pub use second_mass::{TwoMass, TwoMassPiece, TwoMassState};
 pub use wire::*;

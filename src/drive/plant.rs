@@ -2,19 +2,18 @@
 //!
 //! In: voltage and gravity torque, constant over a tick. Out: the state after the tick. The solution is the exact one of the
 //! hybrid system: a tick in which the axis stops, reverses or breaks away is split at that instant ([`Plant::pieces`]).
-//! Does not know compliance, backlash or vibration; what is not modelled is absorbed by the balancing delay.
+//! Rigid: a load behind a spring is `second_mass`, play is `backlash`; what is not modelled is absorbed by the balancing delay.
 //!
 //! Assumes that a tick is shorter than half a period of the electro-mechanical oscillation sqrt(Kt Ke / (L J)), which is some
 //! hundred ticks in any real drive: then the acceleration changes its sign at most once in a tick and no stop is overlooked.
 
+use super::integral::falling_zero;
 use super::transition::{Excess, Transition};
 use crate::machine::{DriveData, MechanicsData, MotorData};
 
 /// More stops and breakaways than one tick can hold. They cannot follow each other closely, because u is constant in a tick and
 /// the current tends to one value; the bound only ends the loop where rounding makes the axis rest and move in turn.
 const PIECES_MAX: u32 = 16;
-/// Newton steps and bisections in the search for an instant. Bisection alone needs 52 to the last bit.
-const SEARCH_STEPS_MAX: u32 = 64;
 
 /// i, w, th.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,19 +38,19 @@ pub struct Piece {
 }
 
 /// Constants of the plant and the map over one tick.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Plant {
-    motor: MotorData,
-    mechanics: MechanicsData,
-    has_dry_friction: bool,
-    gravity_turns: bool,
+    pub(super) motor: MotorData,
+    pub(super) mechanics: MechanicsData,
+    pub(super) has_dry_friction: bool,
+    pub(super) gravity_turns: bool,
     /// Map over a tick in motion.
-    tick: Transition,
+    pub(super) tick: Transition,
     /// (1 - exp(-R h / L)) / R: current by voltage over a tick at rest.
-    rest_gain_a_per_v: f64,
+    pub(super) rest_gain_a_per_v: f64,
     /// Bound on 2 h / J: no speed minimum inside a tick lies deeper below its ends than this times the change of torque.
-    dip_rad_s_per_n_m: f64,
-    period_s: f64,
+    pub(super) dip_rad_s_per_n_m: f64,
+    pub(super) period_s: f64,
 }
 
 impl Plant {
@@ -116,20 +115,29 @@ impl Plant {
         if w == 0.0 && self.has_dry_friction {
             return self.step_from_rest(state, voltage_v, gravity_n_m);
         }
+        let (next, usual) = self.usual_step(state, voltage_v, gravity_n_m);
+        if usual {
+            return next;
+        }
+        self.pieces(state, voltage_v, gravity_n_m, self.period_s, |_| {})
+    }
+
+    /// The map over a tick in motion, and whether nothing happened in it. Not for an axis at rest with dry friction.
+    #[inline(always)]
+    pub(super) fn usual_step(&self, state: PlantState, voltage_v: f64, gravity_n_m: f64) -> (PlantState, bool) {
+        let w = state.speed_rad_s;
         let against_n_m = self.mechanics.coulomb_friction_n_m.copysign(w) + gravity_n_m;
         let excess = self.excess(state, voltage_v, against_n_m);
         let next = self.tick.apply(state, excess);
         // The usual tick: the speed keeps its sign at the end, and had no minimum on the other side of zero in between.
         let keeps_sign = next.speed_rad_s * w > 0.0;
         let (before_n_m, after_n_m) = (excess.torque_n_m, self.excess(next, voltage_v, against_n_m).torque_n_m);
-        let may_dip = before_n_m * w < 0.0
-            && after_n_m * w > 0.0
-            && w.abs() < self.dip_rad_s_per_n_m * (after_n_m - before_n_m).abs();
+        // No short cuts in these conditions: `batch` takes many axes at once through them.
+        let may_dip = (before_n_m * w < 0.0)
+            & (after_n_m * w > 0.0)
+            & (w.abs() < self.dip_rad_s_per_n_m * (after_n_m - before_n_m).abs());
         // A state that has left the range of f64 is passed on as it is: the search for instants would hide it.
-        if (keeps_sign && !may_dip) || !self.has_dry_friction || !next.speed_rad_s.is_finite() {
-            return next;
-        }
-        self.pieces(state, voltage_v, gravity_n_m, self.period_s, |_| {})
+        (next, (keeps_sign & !may_dip) | !self.has_dry_friction | !next.speed_rad_s.is_finite())
     }
 
     /// A tick that starts at rest with dry friction: mostly it stays there.
@@ -311,25 +319,4 @@ impl Moving<'_> {
             (state.speed_rad_s * self.side, slope_rad_s2 * self.side)
         })
     }
-}
-
-/// Zero of a function that is positive at `low_s` and not at `high_s`: Newton, kept inside the bracket by bisection. `function`
-/// gives value and slope.
-fn falling_zero(mut low_s: f64, mut high_s: f64, function: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let mut time_s = 0.5 * (low_s + high_s);
-    for _ in 0..SEARCH_STEPS_MAX {
-        let (value, slope) = function(time_s);
-        if value > 0.0 {
-            low_s = time_s;
-        } else {
-            high_s = time_s;
-        }
-        let newton_s = time_s - value / slope;
-        let next_s = if newton_s > low_s && newton_s < high_s { newton_s } else { 0.5 * (low_s + high_s) };
-        if (next_s - time_s).abs() <= f64::EPSILON * high_s {
-            return next_s;
-        }
-        time_s = next_s;
-    }
-    time_s
 }

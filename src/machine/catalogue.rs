@@ -9,8 +9,9 @@ use super::checked::{
     FineInterpolation, PathMode, TimeLawKind,
 };
 use super::choices::{Carries, KinematicsType, words};
-use super::drive_catalogue::{DRIVE, ENCODER, MECHANICS, MOTOR};
+use super::drive_catalogue::DRIVE;
 use super::keys::{Absent, Accepts, Key, Range, TableKeys};
+use super::mechanics_catalogue::{ENCODER, MECHANICS, MOTOR};
 use Absent::{Means, Number as Value, Required, Word};
 use Accepts::{Choice, Joints, Number, Text, Vector, Whole};
 

@@ -4,6 +4,7 @@
 //! unique, every limit finite and positive, every period a whole number of ticks.
 
 use super::drive_options::{DriveOptions, PositionSource};
+use super::error_table::ErrorTable;
 use crate::base::{AxisId, AxisKind, PerAxis, TimeBase};
 
 /// A machine whose every value has been checked.
@@ -448,8 +449,12 @@ pub struct DriveData {
     pub motor: MotorData,
     /// Mechanics.
     pub mechanics: MechanicsData,
+    /// Error of the screw: how much further the load is than `transmission_lu_per_rad` says.
+    pub pitch_error: Option<ErrorTable>,
     /// Encoders.
     pub encoder: EncoderData,
+    /// MD32700, $AA_ENC_COMP: added to the measured position.
+    pub encoder_compensation: Option<ErrorTable>,
     /// Filters, compensations and limits besides the cascade.
     pub options: DriveOptions,
 }
@@ -501,6 +506,12 @@ pub struct MechanicsData {
     pub gravity_cos_n_m: f64,
     /// Play between motor and load; 0 = none.
     pub backlash_lu: f64,
+    /// `Jl`: share of `J` behind a spring; 0 = a rigid axis. Less than `J`.
+    pub load_inertia_kg_m2: f64,
+    /// `c`, between motor and load; positive where there is a load inertia.
+    pub coupling_stiffness_n_m_per_rad: f64,
+    /// `d`, between motor and load.
+    pub coupling_damping_n_m_s_per_rad: f64,
 }
 
 /// `[axes.*.encoder]`.

@@ -1,16 +1,17 @@
-//! `[axes.*.drive]`, `motor`, `mechanics`, `encoder`: from the file to checked drive data in SI units.
+//! `[axes.*.drive]`: from the file to checked drive data in SI units; `motor`, `mechanics` and `encoder` come from `mechanics`.
 //!
 //! In: the section of an axis. Out: [`DriveData`] and the cycles of its loops, in seconds: they become ticks in `clock`. A missing
 //! drive is an ideal axis; half a drive is an error. Model: models/drive.md section 2; what is rejected: section 8.
 
 use super::axis::{by_kind, lu};
-use super::checked::{AxisLimits, DriveData, EncoderData, MechanicsData, MonitoringData, MotorData};
+use super::checked::{AxisLimits, DriveData, MonitoringData};
 use super::clock::LoopCycles;
 use super::drive_options::{options, small_lu};
+use super::mechanics::{Mechanics, by_motor, encoder, mechanics, motor, motor_kind};
 use super::section::Section;
 use crate::base::AxisKind;
 use crate::base::diagnostics::Diagnostic;
-use crate::base::units::{RAD_PER_REV, h_from_mh, mm_from_um, s_from_ms, s_from_us};
+use crate::base::units::{mm_from_um, s_from_ms, s_from_us};
 
 /// The tables that are needed together.
 const TABLES: [&str; 3] = ["drive", "motor", "mechanics"];
@@ -29,9 +30,9 @@ pub(super) fn drive<'f>(axis: &Section<'f>, limits: &AxisLimits) -> Option<(Driv
         let mark = axis.entry(first).map_or(&axis.mark, |entry| &entry.key_mark);
         axis.report(mark, "not complete", Diagnostic::error("M0004", message).help(help));
     }
+    let axis = &axis.clone().with_motor(motor_kind(axis));
     // What is there is checked even if the rest is missing, so that one pass finds all.
-    let mechanics = mechanics(axis);
-    let (data, cycles) = controllers(axis, motor(axis), mechanics, encoder(axis));
+    let (data, cycles) = controllers(axis);
     if present.len() < TABLES.len() {
         return None;
     }
@@ -39,12 +40,9 @@ pub(super) fn drive<'f>(axis: &Section<'f>, limits: &AxisLimits) -> Option<(Driv
     Some((data, cycles))
 }
 
-fn controllers<'f>(
-    axis: &Section<'f>,
-    motor: MotorData,
-    mechanics: MechanicsData,
-    encoder: EncoderData,
-) -> (DriveData, LoopCycles<'f>) {
+fn controllers<'f>(axis: &Section<'f>) -> (DriveData, LoopCycles<'f>) {
+    let Mechanics { data: mechanics, pitch_error } = mechanics(axis);
+    let (encoder, encoder_compensation) = encoder(axis);
     let drive = axis.table_reported_if_missing("drive", "axes.*.drive");
     let kind = drive.kind().unwrap_or(AxisKind::Linear);
     let window = |linear, rotary| match kind {
@@ -74,20 +72,22 @@ fn controllers<'f>(
         velocity_feedforward_ratio: drive.number("velocity_feedforward"),
         torque_feedforward_ratio: drive.number("torque_feedforward"),
         feedforward_inertia_kg_m2: drive
-            .optional_number("feedforward_inertia_kg_m2")
+            .optional_number(by_motor(axis, "feedforward_inertia_kg_m2", "feedforward_mass_kg"))
             .unwrap_or(mechanics.inertia_kg_m2),
         setpoint_delay_s: s_from_ms(drive.number("setpoint_delay_ms")),
         feedforward_delay_s: s_from_ms(drive.number("feedforward_delay_ms")),
         speed_setpoint_max_lu_s: lu(kind, drive.optional_number(speed_key).unwrap_or(f64::INFINITY)),
-        speed_gain_n_m_s_per_rad: drive.number("speed_gain_n_m_s_per_rad"),
+        speed_gain_n_m_s_per_rad: drive.number(by_motor(axis, "speed_gain_n_m_s_per_rad", "speed_gain_n_s_per_m")),
         speed_reset_time_s: s_from_ms(drive.number("speed_reset_time_ms")),
         current_gain_v_per_a: drive.number("current_gain_v_per_a"),
         current_reset_time_s: s_from_ms(drive.number("current_reset_time_ms")),
         current_max_a: drive.number("current_max_a"),
         voltage_max_v: drive.number("voltage_max_v"),
-        motor,
+        motor: motor(axis),
         mechanics,
+        pitch_error,
         encoder,
+        encoder_compensation,
         options: options(&drive, position_cycle_s, speed_cycle_s),
     };
     if in_position_fine_lu > in_position_coarse_lu {
@@ -102,77 +102,6 @@ fn controllers<'f>(
         drive,
     };
     (data, cycles)
-}
-
-fn motor(axis: &Section<'_>) -> MotorData {
-    let motor = axis.table_reported_if_missing("motor", "axes.*.motor");
-    MotorData {
-        resistance_ohm: motor.number("resistance_ohm"),
-        inductance_h: h_from_mh(motor.number("inductance_mh")),
-        back_emf_v_s_per_rad: motor.number("back_emf_v_s_per_rad"),
-        torque_constant_n_m_per_a: motor.number("torque_constant_n_m_per_a"),
-    }
-}
-
-fn mechanics(axis: &Section<'_>) -> MechanicsData {
-    let mechanics = axis.table_reported_if_missing("mechanics", "axes.*.mechanics");
-    let kind = mechanics.kind().unwrap_or(AxisKind::Linear);
-    let coulomb_friction_n_m = mechanics.number("coulomb_friction_n_m");
-    let breakaway_friction_n_m = mechanics.optional_number("breakaway_friction_n_m").unwrap_or(coulomb_friction_n_m);
-    if breakaway_friction_n_m < coulomb_friction_n_m {
-        let message = format!(
-            "{} = {breakaway_friction_n_m} N·m is less than coulomb_friction_n_m = {coulomb_friction_n_m} N·m",
-            mechanics.full("breakaway_friction_n_m")
-        );
-        let help = "friction at rest is at least that in motion; without the key it is the same";
-        mechanics.report_at("breakaway_friction_n_m", "", Diagnostic::error("M0008", message).help(help));
-    }
-    for key in ["gravity_sin_n_m", "gravity_cos_n_m"] {
-        if kind == AxisKind::Linear && mechanics.number(key).abs() > 0.0 {
-            let message = format!("{} turns with the axis angle, and a linear axis has none", mechanics.full(key));
-            mechanics.report_at(key, "", Diagnostic::error("M0008", message).help("use gravity_n_m"));
-        }
-    }
-    MechanicsData {
-        transmission_lu_per_rad: transmission(&mechanics, kind),
-        inertia_kg_m2: mechanics.number("inertia_kg_m2"),
-        viscous_friction_n_m_s_per_rad: mechanics.number("viscous_friction_n_m_s_per_rad"),
-        coulomb_friction_n_m,
-        breakaway_friction_n_m,
-        gravity_n_m: mechanics.number("gravity_n_m"),
-        gravity_sin_n_m: mechanics.number("gravity_sin_n_m"),
-        gravity_cos_n_m: mechanics.number("gravity_cos_n_m"),
-        backlash_lu: small_lu(&mechanics, "backlash_um", "backlash_deg"),
-    }
-}
-
-/// r = pitch / (2π) / gear ratio, or 1 / gear ratio (models/drive.md section 2, in rad instead of deg).
-fn transmission(mechanics: &Section<'_>, kind: AxisKind) -> f64 {
-    let gear_ratio = mechanics.optional_number("gear_ratio");
-    match kind {
-        AxisKind::Linear => mechanics.number("pitch_mm") / RAD_PER_REV / gear_ratio.unwrap_or(1.0),
-        AxisKind::Rotary => {
-            if !mechanics.has("gear_ratio") && !mechanics.has("pitch_mm") {
-                let help = "add gear_ratio = ..., motor turns per turn of the axis; it may be negative, not 0";
-                mechanics.missing("gear_ratio", help);
-            }
-            1.0 / gear_ratio.unwrap_or(f64::NAN)
-        }
-    }
-}
-
-fn encoder(axis: &Section<'_>) -> EncoderData {
-    let encoder = axis.table("encoder", "axes.*.encoder");
-    let kind = encoder.kind().unwrap_or(AxisKind::Linear);
-    let position_resolution_lu = match kind {
-        AxisKind::Linear => mm_from_um(encoder.number("position_resolution_um")),
-        AxisKind::Rotary => lu(kind, encoder.number("position_resolution_deg")),
-    };
-    EncoderData {
-        position_resolution_lu,
-        motor_resolution_rad: encoder.number("motor_resolution_rad"),
-        position_source: encoder.choice("position_source"),
-    }
 }
 
 /// A drive that cannot reach the velocity of its axis never follows a rapid: worth a word.

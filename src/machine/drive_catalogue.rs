@@ -1,9 +1,9 @@
-//! Every key of `[axes.*.drive]`, `motor`, `mechanics` and `encoder`: name, unit, range, default, machine data, meaning.
+//! Every key of `[axes.*.drive]`: name, unit, range, default, machine data, meaning.
 //!
 //! In: nothing. Out: the rows that `catalogue` lists. Symbols in brackets are those of models/drive.md section 2.
 
 use super::choices::words;
-use super::drive_options::{Balancing, FilterShape, JerkFilterKind, PositionSource};
+use super::drive_options::{Balancing, FilterShape, JerkFilterKind};
 use super::keys::{Absent, Accepts, Key, Range};
 use Absent::{Means, No, Number as Value, Required, Word};
 use Accepts::{Choice, Flag, Number};
@@ -100,6 +100,16 @@ pub(super) const DRIVE: &[Key] = &[
         Means("mechanics.inertia_kg_m2"),
         "[J_ff] inertia that the torque feed-forward works with",
     )
+    .turning("feedforward_mass_kg")
+    .md("MD32650"),
+    Key::new(
+        "feedforward_mass_kg",
+        "kg",
+        NOT_NEGATIVE,
+        Means("mechanics.mass_kg"),
+        "[J_ff] mass that the torque feed-forward works with",
+    )
+    .pushing("feedforward_inertia_kg_m2")
     .md("MD32650"),
     Key::new("setpoint_delay_ms", "ms", DELAY, Value(0.0), "[d_pos] balancing delay of the position set-point")
         .md("MD32810, MD32800"),
@@ -111,6 +121,10 @@ pub(super) const DRIVE: &[Key] = &[
         .rotary("speed_setpoint_max_mm_s")
         .md("MD36210, p1082"),
     Key::new("speed_gain_n_m_s_per_rad", "N·m·s/rad", POSITIVE, Required, "[Kp] gain of the speed controller")
+        .turning("speed_gain_n_s_per_m")
+        .md("p1460, MD1407"),
+    Key::new("speed_gain_n_s_per_m", "N·s/m", POSITIVE, Required, "[Kp] gain of the speed controller")
+        .pushing("speed_gain_n_m_s_per_rad")
         .md("p1460, MD1407"),
     Key::new(
         "speed_reset_time_ms",
@@ -172,7 +186,11 @@ pub(super) const DRIVE: &[Key] = &[
         Means("Kt times current_max_a"),
         "upper torque limit, at the motor shaft",
     )
+    .turning("force_upper_n")
     .md("p1520"),
+    Key::new("force_upper_n", "N", UPPER, Means("force constant times current_max_a"), "upper force limit")
+        .pushing("torque_upper_n_m")
+        .md("p1520"),
     Key::new(
         "torque_lower_n_m",
         "N·m",
@@ -180,7 +198,11 @@ pub(super) const DRIVE: &[Key] = &[
         Means("minus Kt times current_max_a"),
         "lower torque limit, at the motor shaft",
     )
+    .turning("force_lower_n")
     .md("p1521"),
+    Key::new("force_lower_n", "N", LOWER, Means("minus force constant times current_max_a"), "lower force limit")
+        .pushing("torque_lower_n_m")
+        .md("p1521"),
     Key::new(
         "friction_compensation_mm_s",
         "mm/s",
@@ -395,99 +417,4 @@ pub(super) const DRIVE: &[Key] = &[
         "filter 4 of the current set-point: damping of the numerator, 0 blocks completely",
     )
     .md("p1676"),
-];
-
-pub(super) const MOTOR: &[Key] = &[
-    Key::new("resistance_ohm", "ohm", POSITIVE, Required, "[R] phase resistance").md("p0350"),
-    Key::new("inductance_mh", "mH", POSITIVE, Required, "[L] rotating-field inductance").md("p0356"),
-    Key::new("back_emf_v_s_per_rad", "V·s/rad", NOT_NEGATIVE, Required, "[Ke] back-EMF per phase rms, about Kt / 3")
-        .md("p0317"),
-    Key::new("torque_constant_n_m_per_a", "N·m/A", POSITIVE, Required, "[Kt] torque per A rms").md("p0316"),
-];
-
-pub(super) const MECHANICS: &[Key] = &[
-    Key::new("pitch_mm", "mm", Number(Range::NotZero), Required, "load motion per turn of the screw; may be negative")
-        .linear("gear_ratio")
-        .md("MD31030"),
-    Key::new(
-        "gear_ratio",
-        "",
-        Number(Range::NotZero),
-        Means("1; required on a rotary axis"),
-        "motor turns per turn of the screw or of the rotary axis; may be negative",
-    )
-    .md("MD31060 / MD31050"),
-    Key::new("inertia_kg_m2", "kg·m²", POSITIVE, Required, "[J] everything, at the motor shaft")
-        .md("p0341 * p0342 + p1498"),
-    Key::new(
-        "viscous_friction_n_m_s_per_rad",
-        "N·m·s/rad",
-        NOT_NEGATIVE,
-        Required,
-        "[B] viscous friction, at the motor shaft",
-    ),
-    Key::new("coulomb_friction_n_m", "N·m", NOT_NEGATIVE, Required, "[Tc] dry friction in motion, at the motor shaft"),
-    Key::new(
-        "breakaway_friction_n_m",
-        "N·m",
-        NOT_NEGATIVE,
-        Means("coulomb_friction_n_m"),
-        "[Ts] dry friction at rest, at least coulomb_friction_n_m",
-    ),
-    Key::new("gravity_n_m", "N·m", ANY, Value(0.0), "[g0] constant load torque at the motor: a vertical axis"),
-    Key::new(
-        "gravity_sin_n_m",
-        "N·m",
-        ANY,
-        Value(0.0),
-        "[gs] load torque with the sine of the axis angle: a tilting table",
-    ),
-    Key::new(
-        "gravity_cos_n_m",
-        "N·m",
-        ANY,
-        Value(0.0),
-        "[gc] load torque with the cosine of the axis angle: a tilting table",
-    ),
-    Key::new("backlash_um", "µm", NOT_NEGATIVE, Value(0.0), "play between motor and load, 0 = none")
-        .linear("backlash_deg"),
-    Key::new("backlash_deg", "deg", NOT_NEGATIVE, Value(0.0), "play between motor and load, 0 = none")
-        .rotary("backlash_um"),
-];
-
-pub(super) const ENCODER: &[Key] = &[
-    Key::new(
-        "position_resolution_um",
-        "µm",
-        NOT_NEGATIVE,
-        Value(0.0),
-        "[q_pos] quantum of the position scale, 0 = ideal",
-    )
-    .linear("position_resolution_deg")
-    .md("MD31010"),
-    Key::new(
-        "position_resolution_deg",
-        "deg",
-        NOT_NEGATIVE,
-        Value(0.0),
-        "[q_pos] quantum of the position scale, 0 = ideal",
-    )
-    .rotary("position_resolution_um")
-    .md("MD31010"),
-    Key::new(
-        "motor_resolution_rad",
-        "rad",
-        NOT_NEGATIVE,
-        Value(0.0),
-        "[q_mot] quantum of the motor encoder, 0 = ideal",
-    )
-    .md("p0408"),
-    Key::new(
-        "position_source",
-        "",
-        Choice(words::<PositionSource>),
-        Word("load"),
-        "where the position is measured: load = scale, motor = motor encoder",
-    )
-    .md("MD31040"),
 ];

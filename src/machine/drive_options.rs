@@ -5,6 +5,7 @@
 
 use super::axis::{by_kind, lu};
 use super::choices::Choice;
+use super::mechanics::by_motor;
 use super::section::Section;
 use crate::base::AxisKind;
 use crate::base::diagnostics::Diagnostic;
@@ -206,6 +207,8 @@ const CURRENT_FILTER: [FilterKeys; CURRENT_FILTERS] = [
 pub(super) fn options(drive: &Section<'_>, position_cycle_s: f64, speed_cycle_s: f64) -> DriveOptions {
     let kind = drive.kind().unwrap_or(AxisKind::Linear);
     let pulse = by_kind(kind, "friction_compensation_mm_s", "friction_compensation_deg_s");
+    let upper = by_motor(drive, "torque_upper_n_m", "force_upper_n");
+    let lower = by_motor(drive, "torque_lower_n_m", "force_lower_n");
     let model_hz = drive.number("reference_model_frequency_hz");
     below_half_rate(drive, "reference_model_frequency_hz", model_hz, speed_cycle_s);
     DriveOptions {
@@ -220,8 +223,8 @@ pub(super) fn options(drive: &Section<'_>, position_cycle_s: f64, speed_cycle_s:
             damping_ratio: drive.number("reference_model_damping"),
             ..Filter::default()
         },
-        torque_upper_n_m: drive.optional_number("torque_upper_n_m").unwrap_or(f64::INFINITY),
-        torque_lower_n_m: drive.optional_number("torque_lower_n_m").unwrap_or(f64::NEG_INFINITY),
+        torque_upper_n_m: drive.optional_number(upper).unwrap_or(f64::INFINITY),
+        torque_lower_n_m: drive.optional_number(lower).unwrap_or(f64::NEG_INFINITY),
         friction_pulse_lu_s: lu(kind, drive.number(pulse)),
         friction_pulse_time_s: s_from_ms(drive.number("friction_compensation_time_ms")),
         backlash_compensation_lu: small_lu(drive, "backlash_compensation_um", "backlash_compensation_deg"),

@@ -3,12 +3,27 @@
 //! In: nothing (plain data). Out: [`Key`], [`TableKeys`], [`Range`]. The reader, the JSON Schema and the user's table of keys are
 //! all made from these, so that they cannot disagree. The keys themselves are listed in `catalogue`.
 
+use super::choices::Choice;
 use crate::base::AxisKind;
 
 /// Largest magnitude of a value: far beyond any machine, and far enough from overflow after conversion.
 pub const MAGNITUDE_MAX: f64 = 1e12;
 /// Smallest magnitude of a value that is not 0: a quotient of two values stays finite.
 pub const MAGNITUDE_MIN: f64 = 1e-12;
+
+/// What turns or pushes an axis: decides in which units its drive is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum MotorKind {
+    /// Behind screw, rack or gear, or a torque motor: N·m, kg·m², rad.
+    #[default]
+    Rotary,
+    /// The motor is the axis: N, kg, m.
+    Linear,
+}
+
+impl Choice for MotorKind {
+    const WORDS: &'static [(&'static str, Self)] = &[("rotary", Self::Rotary), ("linear", Self::Linear)];
+}
 
 /// Numbers that a key accepts. NaN never; infinity only where it means "no limit".
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +95,8 @@ pub enum Accepts {
     Interval,
     /// `[x, y, z]`.
     Vector,
+    /// A list of numbers, at least two and at most this many.
+    Values(u32),
     /// The array `kinematics.rotary`.
     Joints,
 }
@@ -112,7 +129,9 @@ pub struct Key {
     pub absent: Absent,
     /// Kind of axis that it belongs to; `None`: both, or not about an axis.
     pub kind: Option<AxisKind>,
-    /// The key to use on an axis of the other kind, empty without one.
+    /// Kind of motor that it belongs to; `None`: both, or not about a motor.
+    pub motor: Option<MotorKind>,
+    /// The key to use on an axis or with a motor of the other kind, empty without one.
     pub counterpart: &'static str,
     /// Machine data or drive parameter of the control, empty without one.
     pub machine_data: &'static str,
@@ -139,7 +158,7 @@ impl Key {
         absent: Absent,
         help: &'static str,
     ) -> Self {
-        Self { name, unit, accepts, absent, kind: None, counterpart: "", machine_data: "", help }
+        Self { name, unit, accepts, absent, kind: None, motor: None, counterpart: "", machine_data: "", help }
     }
 
     pub(super) const fn md(mut self, machine_data: &'static str) -> Self {
@@ -159,9 +178,28 @@ impl Key {
         self
     }
 
-    /// Whether an axis of this kind has the key.
-    pub fn fits(&self, kind: Option<AxisKind>) -> bool {
-        self.kind.is_none() || kind.is_none() || self.kind == kind
+    /// For rotary motors; `counterpart` is the key of a linear one.
+    pub(super) const fn turning(mut self, counterpart: &'static str) -> Self {
+        self.motor = Some(MotorKind::Rotary);
+        // Beside a counterpart on the other kind of axis there is none for the other motor.
+        if !counterpart.is_empty() {
+            self.counterpart = counterpart;
+        }
+        self
+    }
+
+    /// For linear motors; `counterpart` is the key of a rotary one.
+    pub(super) const fn pushing(mut self, counterpart: &'static str) -> Self {
+        self.kind = Some(AxisKind::Linear);
+        self.motor = Some(MotorKind::Linear);
+        self.counterpart = counterpart;
+        self
+    }
+
+    /// Whether an axis of this kind with this kind of motor has the key; `None`: not known.
+    pub fn fits(&self, kind: Option<AxisKind>, motor: Option<MotorKind>) -> bool {
+        (self.kind.is_none() || kind.is_none() || self.kind == kind)
+            && (self.motor.is_none() || motor.is_none() || self.motor == motor)
     }
 
     /// The allowed values in words.
@@ -176,6 +214,7 @@ impl Key {
             Accepts::Interval => format!("[lower, upper] in {}, lower < upper", self.unit),
             Accepts::Vector if self.unit.is_empty() => "[x, y, z], not all 0".to_owned(),
             Accepts::Vector => format!("[x, y, z] in {}", self.unit),
+            Accepts::Values(most) => format!("[number, number, ...] in {}, 2 to {most} of them", self.unit),
             Accepts::Joints => "[{ axis, direction, point_mm }, ...], one or two".to_owned(),
         }
     }

@@ -15,9 +15,12 @@ mod document;
 mod drive;
 mod drive_catalogue;
 mod drive_options;
+mod error_table;
 mod keys;
 mod later;
 mod load;
+mod mechanics;
+mod mechanics_catalogue;
 mod overrides;
 mod periods;
 mod schema;
@@ -32,7 +35,8 @@ pub use choices::Choice;
 pub use drive_options::{
     Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, JerkFilter, JerkFilterKind, PositionSource,
 };
-pub use keys::{Absent, Accepts, Key, Range, TableKeys};
+pub use error_table::ErrorTable;
+pub use keys::{Absent, Accepts, Key, MotorKind, Range, TableKeys};
 pub use later::unsupported;
 pub use load::{LoadError, Loaded, load, parse};
 pub use schema::schema;

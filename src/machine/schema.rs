@@ -5,22 +5,33 @@
 
 use super::catalogue::tables;
 use super::checked::DynamicsMode;
-use super::keys::{Absent, Accepts, Key, Range, TableKeys};
+use super::keys::{Absent, Accepts, Key, MotorKind, Range, TableKeys};
 use crate::base::AxisKind;
 use serde_json::{Map, Value, json};
 
 /// The schema; `machines/machine.schema.json` is this, printed.
 pub fn schema() -> Value {
-    let mut root = object("", None);
+    let mut root = object("", None, None);
     let tables = ["cycle", "look_ahead", "feed", "smoothing", "spindle", "kinematics"];
     for table in tables {
-        set(&mut root, &["properties", table], object(table, None));
+        set(&mut root, &["properties", table], object(table, None, None));
     }
-    set(&mut root, &["properties", "kinematics", "properties", "rotary", "items"], object("kinematics.rotary", None));
+    set(
+        &mut root,
+        &["properties", "kinematics", "properties", "rotary", "items"],
+        object("kinematics.rotary", None, None),
+    );
     let axis = json!({
         "if": { "properties": { "kind": { "const": "rotary" } }, "required": ["kind"] },
         "then": { "$ref": "#/$defs/rotary_axis" },
-        "else": { "$ref": "#/$defs/linear_axis" },
+        "else": {
+            "if": {
+                "properties": { "motor": { "properties": { "kind": { "const": "linear" } }, "required": ["kind"] } },
+                "required": ["motor"],
+            },
+            "then": { "$ref": "#/$defs/linear_motor_axis" },
+            "else": { "$ref": "#/$defs/linear_axis" },
+        },
     });
     let axes = json!({
         "type": "object",
@@ -36,8 +47,9 @@ pub fn schema() -> Value {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "sollwert machine file, format 1",
         "$defs": {
-            "linear_axis": axis_object(AxisKind::Linear),
-            "rotary_axis": axis_object(AxisKind::Rotary),
+            "linear_axis": axis_object(AxisKind::Linear, MotorKind::Rotary),
+            "linear_motor_axis": axis_object(AxisKind::Linear, MotorKind::Linear),
+            "rotary_axis": axis_object(AxisKind::Rotary, MotorKind::Rotary),
         },
     });
     if let (Value::Object(schema), Value::Object(root)) = (&mut schema, root) {
@@ -46,18 +58,18 @@ pub fn schema() -> Value {
     schema
 }
 
-fn axis_object(kind: AxisKind) -> Value {
-    let mut axis = object("axes.*", Some(kind));
+fn axis_object(kind: AxisKind, motor: MotorKind) -> Value {
+    let mut axis = object("axes.*", Some(kind), None);
     for table in ["drive", "motor", "mechanics", "encoder"] {
         let path = format!("axes.*.{table}");
-        set(&mut axis, &["properties", table], object(&path, Some(kind)));
+        set(&mut axis, &["properties", table], object(&path, Some(kind), Some(motor)));
     }
     if kind == AxisKind::Rotary {
         push(&mut axis, &["properties", "mechanics", "required"], json!("gear_ratio"));
     }
     let sets: Map<String, Value> = DynamicsMode::ALL
         .into_iter()
-        .map(|mode| (mode.word().to_owned(), object("axes.*.dynamics.*", Some(kind))))
+        .map(|mode| (mode.word().to_owned(), object("axes.*.dynamics.*", Some(kind), None)))
         .collect();
     set(
         &mut axis,
@@ -75,9 +87,9 @@ fn axis_object(kind: AxisKind) -> Value {
 }
 
 /// A table with its keys.
-fn object(path: &str, kind: Option<AxisKind>) -> Value {
+fn object(path: &str, kind: Option<AxisKind>, motor: Option<MotorKind>) -> Value {
     let keys: &[Key] = tables().iter().find(|table| table.path == path).map_or(&[], |table: &TableKeys| table.keys);
-    let keys = || keys.iter().filter(|key| key.fits(kind));
+    let keys = || keys.iter().filter(|key| key.fits(kind, motor));
     let properties: Map<String, Value> = keys().map(|key| (key.name.to_owned(), property(key))).collect();
     let required: Vec<&str> = keys().filter(|key| key.absent == Absent::Required).map(|key| key.name).collect();
     json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
@@ -129,6 +141,9 @@ fn accepted(key: &Key) -> Value {
         Accepts::Choice(words) => json!({ "enum": words() }),
         Accepts::Interval => numbers(2),
         Accepts::Vector => numbers(3),
+        Accepts::Values(most) => {
+            json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": most })
+        }
         Accepts::Joints => json!({ "type": "array", "maxItems": 2 }),
     }
 }

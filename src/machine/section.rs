@@ -7,7 +7,7 @@
 use super::catalogue;
 use super::choices::Choice;
 use super::document::{Entry, Mark, Node, Texts, Value};
-use super::keys::{Absent, Accepts, Key, Range, TableKeys, quoted_list};
+use super::keys::{Absent, Accepts, Key, MotorKind, Range, TableKeys, quoted_list};
 use crate::base::AxisKind;
 use crate::base::diagnostics::{Diagnostic, Severity, nearest};
 use std::cell::RefCell;
@@ -46,6 +46,7 @@ pub(super) struct Section<'f> {
     findings: &'f Findings<'f>,
     keys: &'static TableKeys,
     kind: Option<AxisKind>,
+    motor: Option<MotorKind>,
     /// The table is missing, and that was reported: its keys need no report of their own.
     quiet: bool,
     /// Dotted path as a person writes it, such as `axes.X.drive`.
@@ -59,8 +60,8 @@ impl<'f> Section<'f> {
     /// The table at the top of the file; reports its unknown keys.
     pub fn root(findings: &'f Findings<'f>, node: &'f Node) -> Self {
         let mark = node.mark.clone();
-        let root =
-            Self { findings, keys: table_keys(""), kind: None, quiet: false, path: String::new(), entries: &[], mark };
+        let (keys, path) = (table_keys(""), String::new());
+        let root = Self { findings, keys, kind: None, motor: None, quiet: false, path, entries: &[], mark };
         root.filled(node)
     }
 
@@ -70,6 +71,7 @@ impl<'f> Section<'f> {
             findings: self.findings,
             keys: table_keys(pattern),
             kind: self.kind,
+            motor: self.motor,
             quiet: false,
             path: self.full(name),
             entries: &[],
@@ -114,6 +116,17 @@ impl<'f> Section<'f> {
         self.kind = Some(kind);
         self.check_keys();
         self
+    }
+
+    /// The kind of the axis' motor decides which keys the tables of its drive may have.
+    pub fn with_motor(mut self, motor: MotorKind) -> Self {
+        self.motor = Some(motor);
+        self
+    }
+
+    /// Kind of the axis' motor.
+    pub fn motor(&self) -> MotorKind {
+        self.motor.unwrap_or_default()
     }
 
     /// Kind of the axis that the table is about.
@@ -306,6 +319,25 @@ impl<'f> Section<'f> {
         }
     }
 
+    /// A list of numbers; `None` if the key is missing, NaN where a report was made.
+    pub fn values(&self, name: &str) -> Option<Vec<f64>> {
+        let key = self.key(name);
+        let entry = self.entry(name)?;
+        let full = self.full(name);
+        let Accepts::Values(most) = key.accepts else { return None };
+        let Value::List(items) = &entry.node.value else {
+            self.wrong_type(&entry.node, &full, "a list of numbers");
+            return None;
+        };
+        if !(2..=most as usize).contains(&items.len()) {
+            let message = format!("{full} has {} numbers, allowed: 2 to {most}", items.len());
+            self.report(&entry.node.mark, "", Diagnostic::error("M0006", message).help(key.help));
+            return None;
+        }
+        let number = |(n, item)| self.number_in(item, &format!("{full}[{n}]"), Range::Any, key);
+        Some(items.iter().enumerate().map(number).collect())
+    }
+
     /// Tables of a list; `None` if the key is missing.
     pub fn list(&self, name: &str) -> Option<&'f [Node]> {
         let entry = self.entry(name)?;
@@ -338,7 +370,8 @@ impl<'f> Section<'f> {
     pub fn missing(&self, name: &str, help: &str) {
         let key = self.key(name);
         // A misspelt key, or that of the other kind of axis, has its own report.
-        if self.quiet || self.has(key.counterpart) || self.entries.iter().any(|entry| self.misspells(entry, name)) {
+        let elsewhere = self.has(key.counterpart) && self.known().all(|known| known != key.counterpart);
+        if self.quiet || elsewhere || self.entries.iter().any(|entry| self.misspells(entry, name)) {
             return;
         }
         let table = if self.path.is_empty() { "the machine file".to_owned() } else { format!("[{}]", self.path) };
@@ -353,7 +386,7 @@ impl<'f> Section<'f> {
     }
 
     fn key(&self, name: &str) -> &'static Key {
-        let found = self.keys.keys.iter().find(|key| key.name == name && key.fits(self.kind));
+        let found = self.keys.keys.iter().find(|key| key.name == name && key.fits(self.kind, self.motor));
         found.unwrap_or_else(|| unreachable!("{name} is not in the catalogue of {}", self.keys.path))
     }
 
@@ -368,7 +401,7 @@ impl<'f> Section<'f> {
                 continue;
             }
             match self.keys.keys.iter().find(|key| key.name == name) {
-                Some(key) if key.fits(self.kind) => {}
+                Some(key) if key.fits(self.kind, self.motor) => {}
                 Some(key) => self.wrong_kind(entry, key),
                 None => self.unknown(entry),
             }
@@ -376,6 +409,9 @@ impl<'f> Section<'f> {
     }
 
     fn wrong_kind(&self, entry: &Entry, key: &Key) {
+        if key.fits(self.kind, None) {
+            return self.wrong_motor(entry, key);
+        }
         let (is, other) = match self.kind {
             Some(AxisKind::Rotary) => ("a rotary axis", "linear"),
             _ => ("a linear axis", "rotary"),
@@ -388,10 +424,22 @@ impl<'f> Section<'f> {
         self.report(&entry.key_mark, "not for this kind of axis", Diagnostic::error("M0003", message).help(help));
     }
 
+    fn wrong_motor(&self, entry: &Entry, key: &Key) {
+        let other = if self.motor() == MotorKind::Linear { "rotary" } else { "linear" };
+        let message = format!("{} belongs to a {other} motor", self.full(&entry.key));
+        let motor = self.on_this_axis("axes.*.motor");
+        let fits = |name: &str| self.known().any(|known| known == name);
+        let help = match key.counterpart {
+            name if !fits(name) => format!("remove it, or write kind = \"{other}\" in [{motor}] if the motor is one"),
+            counterpart => format!("use {counterpart}, or write kind = \"{other}\" in [{motor}] if the motor is one"),
+        };
+        self.report(&entry.key_mark, "not for this kind of motor", Diagnostic::error("M0003", message).help(help));
+    }
+
     /// Keys and tables that may stand here.
     fn known(&self) -> impl Iterator<Item = &'static str> + use<> {
-        let kind = self.kind;
-        let keys = self.keys.keys.iter().filter(move |key| key.fits(kind)).map(|key| key.name);
+        let (kind, motor) = (self.kind, self.motor);
+        let keys = self.keys.keys.iter().filter(move |key| key.fits(kind, motor)).map(|key| key.name);
         keys.chain(self.keys.tables.iter().copied())
     }
 

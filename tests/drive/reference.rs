@@ -7,6 +7,7 @@
 
 use crate::rig::{self, Rig, input};
 use sollwert::drive::{AxisSignals, DriveInput, flags};
+use sollwert::machine::{ErrorTable, PositionSource};
 use std::f64::consts::TAU;
 
 const REFERENCE: &str = include_str!("reference.csv");
@@ -99,4 +100,37 @@ fn tilting_table_with_quantised_encoders_from_a_cold_start() {
         data.encoder.motor_resolution_rad = 2e-4;
     });
     compare("tilt", &rig.run(setpoints(131, |k| 0.3 + 0.05 * (1.0 - (TAU * 4.0 * k * 2e-3).cos()))));
+}
+
+#[test]
+fn two_masses_with_stops_and_breakaways() {
+    let rig = rig::mvc_x().friction(0.6, 0.9).with(|data| {
+        data.velocity_feedforward_ratio = 1.0;
+        data.mechanics.gravity_n_m = 0.5;
+        data.mechanics.load_inertia_kg_m2 = 0.0051;
+        data.mechanics.coupling_stiffness_n_m_per_rad = 1000.0;
+        data.mechanics.coupling_damping_n_m_s_per_rad = 0.03;
+    });
+    let inputs = (0..301).map(|k| DriveInput {
+        load_n_m: if (150..170).contains(&k) { 1.0 } else { 0.0 },
+        ..input(0.3 * (TAU * 5.0 * f64::from(k) * 1e-3).sin())
+    });
+    compare("two_mass", &rig.run(inputs));
+}
+
+#[test]
+fn a_screw_with_errors_measured_at_the_motor() {
+    let table = |step_lu: f64, errors_lu: &[f64]| {
+        Some(ErrorTable { start_lu: -4.0, step_lu, errors_lu: errors_lu.to_vec(), periodic: false })
+    };
+    let rig = rig::mvc_x().with(|data| {
+        data.velocity_feedforward_ratio = 1.0;
+        data.encoder.position_source = PositionSource::Motor;
+        data.mechanics.load_inertia_kg_m2 = 0.004;
+        data.mechanics.coupling_stiffness_n_m_per_rad = 6000.0;
+        data.mechanics.coupling_damping_n_m_s_per_rad = 0.05;
+        data.pitch_error = table(1.5, &[2e-3, 5e-3, -3e-3, 1e-3, 4e-3, 0.0]);
+        data.encoder_compensation = table(3.0, &[2e-3, -2e-3, 3e-3]);
+    });
+    compare("screw", &rig.run(setpoints(401, |k| -5.0 + 6.0 * (1.0 - (TAU * 2.0 * k * 1e-3).cos()))));
 }

@@ -1,7 +1,7 @@
 //! Test machines of models/drive.md section 2, and a bench to run one axis on.
 
 #[path = "../test_machine/mod.rs"]
-mod test_machine;
+pub mod test_machine;
 
 use sollwert::base::TimeBase;
 use sollwert::drive::{AxisDrive, AxisSignals, DriveInput, Start};

@@ -134,7 +134,11 @@ fn every_key_of_the_catalogue_is_read() {
             let path = table.path.replacen('*', axis, 1).replacen('*', "finish", 1);
             let name = if path.is_empty() { key.name.to_owned() } else { format!("{path}.{}", key.name) };
             let source = sollwert::base::SourceText::new("mikron.toml", mikron);
-            let found = machine::parse(&source, &[format!("{name}=2020-01-01")]);
+            let mut sets = vec![format!("{name}=2020-01-01")];
+            if key.motor == Some(machine::MotorKind::Linear) {
+                sets.push("axes.X.motor.kind=linear".to_owned());
+            }
+            let found = machine::parse(&source, &sets);
             let reported =
                 found.err().is_some_and(|found| found.iter().any(|f| f.code == "M0005" && f.message.contains(&name)));
             assert!(reported, "{name} = 2020-01-01 is not reported");

@@ -1,6 +1,7 @@
 //! The machine file from outside: what is accepted, what comes out, and what a person is told.
 
 mod catalogue;
+mod drives;
 mod overrides;
 mod rejected;
 mod shipped;
