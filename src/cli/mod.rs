@@ -17,6 +17,7 @@ mod inputs;
 mod machine;
 mod moves;
 mod output;
+mod recorded;
 mod recover;
 mod report;
 mod run;
