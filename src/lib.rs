@@ -101,4 +101,6 @@ pub mod drive;
 pub mod recorder;
 pub mod kernel;
 pub mod trace;
+pub mod compare;
+pub mod report;
 pub mod cli;

@@ -35,7 +35,7 @@ fn errors_of(output: &Output) -> String {
 fn json_is_one_document_whatever_is_wrong_with_the_input() {
     let folder = folder("command_json");
     for input in ["missing", "directory", "empty", "junk"] {
-        let calls: [&[&str]; 10] = [
+        let calls: [&[&str]; 12] = [
             &["run", input, "-o", "x.mcap"],
             &["run", "good.mpf", "-o", "x.mcap", "-m", input],
             &["time", input],
@@ -45,6 +45,8 @@ fn json_is_one_document_whatever_is_wrong_with_the_input() {
             &["export", input, "-o", "x.csv"],
             &["recover", input, "-o", "x.mcap"],
             &["machine", "check", input],
+            &["compare", input, "good.mpf"],
+            &["report", input, "-o", "x.html"],
             &["machine", "bode", input],
         ];
         for call in calls {

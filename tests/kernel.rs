@@ -172,6 +172,23 @@ fn the_control_stops_an_axis_that_leaves_its_model_and_the_recording_goes_up_to_
     }
 }
 
+/// What is given to `follow` may be a jump that no control would send: the axis recovers, and it is said what a control would have done.
+#[test]
+fn follow_runs_on_where_a_control_would_stop() {
+    let loaded = machine("spinner_mvc850", &[]);
+    let rows: String =
+        (0..1500).map(|k| format!("{},{}\n", f64::from(k) * 1e-3, if k < 100 { 0 } else { 5 })).collect();
+    let source = sollwert::base::SourceText::new("jump.csv", format!("time_s,X_mm\n{rows}"));
+    let table = SetpointTable::from_csv(&source, &loaded.machine).unwrap();
+    let signals = SignalChoice::all();
+    let options =
+        FollowOptions { machine: &loaded, start: Default::default(), recording: None, signals, mantissa_bits: None };
+    let outcome = follow(&table, &options).unwrap();
+    assert!(outcome.alarm.is_none() && outcome.rows == 1500);
+    let told: Vec<&sollwert::base::Diagnostic> = outcome.warnings.iter().filter(|w| w.code == "D0004").collect();
+    assert!(told.len() == 1 && told[0].message.contains("25050") && !told[0].message.contains("line"), "{told:?}");
+}
+
 /// Without an integral part friction holds the axis off its set-point by up to Tc / (Kp Kv) r = 95 µm: for ever.
 #[test]
 fn an_axis_that_never_arrives_is_an_alarm_and_no_hang() {

@@ -49,7 +49,7 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
         pace_ratio: None,
     };
     let outcome = kernel::run(options, &mut |_| {}).map_err(|error| Failure::unreadable(error.0))?;
-    report(&outcome, Some(&recording), &Style { json: arguments.json, drives: true })?;
+    report(&outcome, Some(&recording), &Style { json: arguments.json, drives: true, page: None })?;
     if arguments.json {
         return Ok(());
     }

@@ -6,7 +6,7 @@
 use super::failure::Failure;
 use super::inputs::{MachineChoice, TraceNames, default_recording, refuse_same_file};
 use super::output::{print, print_json, show};
-use super::run::parse_signals;
+use super::recorded::Recorded;
 use crate::base::units::rad_from_deg;
 use crate::base::{AxisKind, Diagnostic, SourceText};
 use crate::drive::Start;
@@ -36,12 +36,8 @@ pub(super) struct FollowArguments {
     /// Axes start balanced, or with empty integrators (brake released)
     #[arg(long, value_enum, default_value = "held")]
     start: StartChoice,
-    /// Signals to record, such as X.current_a,Y.*; default: all
-    #[arg(long, value_name = "SIGNALS")]
-    record: Option<String>,
-    /// Mantissa bits to keep in recorded values, 1 to 52
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=52))]
-    record_precision: Option<u8>,
+    #[command(flatten)]
+    recorded: Recorded,
     /// One JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
@@ -60,7 +56,7 @@ pub(super) fn follow(arguments: &FollowArguments) -> Result<(), Failure> {
         PathBuf::from(format!("{}_followed.mcap", stem.display()))
     });
     refuse_same_file([arguments.setpoints.as_path()].into_iter().chain(arguments.machine.path()), &recording)?;
-    let signals = parse_signals(arguments.record.as_deref(), &machine)?;
+    let signals = arguments.recorded.signals(&machine)?;
     let table = read_setpoints(&arguments.setpoints, &machine, &arguments.names)?;
     let options = FollowOptions {
         machine: &machine,
@@ -70,7 +66,7 @@ pub(super) fn follow(arguments: &FollowArguments) -> Result<(), Failure> {
         },
         recording: Some(&recording),
         signals,
-        mantissa_bits: arguments.record_precision,
+        mantissa_bits: arguments.recorded.record_precision,
     };
     let outcome = follow_setpoints(&table, &options).map_err(Failure::unreadable)?;
     report(&outcome, &recording, arguments.json)

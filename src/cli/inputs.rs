@@ -122,7 +122,7 @@ impl TraceNames {
 }
 
 /// `7=A`.
-fn axis_name(text: &str) -> Result<(u32, String), Failure> {
+pub(super) fn axis_name(text: &str) -> Result<(u32, String), Failure> {
     let parts = text.split_once('=').map(|(number, name)| (number.trim().parse(), name.trim()));
     match parts {
         Some((Ok(number), name)) if !name.is_empty() && !name.contains('.') => Ok((number, name.to_owned())),

@@ -6,6 +6,8 @@
 mod bode;
 mod bode_page;
 mod check;
+mod compare;
+mod compare_tables;
 mod demo;
 mod explain;
 mod export;
@@ -15,7 +17,9 @@ mod inputs;
 mod machine;
 mod moves;
 mod output;
+mod recorded;
 mod recover;
+mod report;
 mod run;
 mod time;
 mod what_if;
@@ -57,6 +61,10 @@ enum Command {
     Moves(moves::MovesArguments),
     /// The drives alone, fed with given position set-points
     Follow(follow::FollowArguments),
+    /// Two traces, aligned: figures per signal, contour error, circles, corners; limits decide the exit code
+    Compare(compare::CompareArguments),
+    /// A trace as a page to look at: plots, path, tables, program
+    Report(report::ReportArguments),
     /// A recording as CSV
     Export(export::ExportArguments),
     /// Rescue what an interrupted run left
@@ -81,6 +89,8 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => (check::check(arguments), arguments.json),
         Command::Moves(arguments) => (moves::moves(arguments), arguments.json),
         Command::Follow(arguments) => (follow::follow(arguments), arguments.json),
+        Command::Compare(arguments) => (compare::compare(arguments), arguments.json),
+        Command::Report(arguments) => (report::report(arguments), arguments.json),
         Command::Export(arguments) => (export::export(arguments), arguments.json),
         Command::Recover(arguments) => (recover::recover(arguments), arguments.json),
         Command::Machine(arguments) => (machine::machine(arguments), arguments.json()),

@@ -5,13 +5,13 @@
 use super::failure::Failure;
 use super::inputs::{MachineChoice, Panel, Surroundings, default_recording, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show, table};
+use super::recorded::Recorded;
+use super::report::write_of_recording;
 use crate::base::Diagnostic;
 use crate::kernel::{self, RunOptions, RunOutcome, RunSummary};
-use crate::machine::Loaded;
-use crate::recorder::{RecordRate, SignalChoice};
+use crate::recorder::SignalChoice;
 use clap::Args;
 use serde_json::json;
-use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 #[derive(Args)]
@@ -28,27 +28,20 @@ pub(super) struct RunArguments {
     /// Recording to write; default: the program's name with .mcap, in the current folder
     #[arg(short, long, value_name = "TRACE.mcap")]
     output: Option<PathBuf>,
+    /// Page with plots, path and figures to write as well (`sollwert report` of the recording)
+    #[arg(long, value_name = "R.html")]
+    report: Option<PathBuf>,
     /// Set-points only: every axis is ideal
     #[arg(long)]
     no_drives: bool,
     /// Simulated seconds per second of real time, 1 = real time; default: as fast as possible
     #[arg(long, value_name = "X", value_parser = positive)]
     pace: Option<f64>,
-    /// Signals to record, such as X.current_a,Y.*/10 (every tenth sample),path.*; default: all
-    #[arg(long, value_name = "SIGNALS")]
-    record: Option<String>,
-    /// Rate of the axis signals: the cycle of the position, speed or current controller
-    #[arg(long, value_name = "RATE", default_value = "position", value_parser = RecordRate::WORDS)]
-    record_rate: String,
-    /// Record every N-th sample of axes and path only
-    #[arg(long, value_name = "N", default_value = "1")]
-    record_decimate: NonZeroU32,
+    #[command(flatten)]
+    recorded: Recorded,
     /// Go on behind the last set-point until every axis is in position; the set-point stands, and figures do not count it
     #[arg(long)]
     record_to_rest: bool,
-    /// Mantissa bits to keep in recorded values, 1 to 52: 36 keep 7e-9 mm and save a fifth of the size
-    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(1..=52))]
-    record_precision: Option<u8>,
     /// Threads: 1 runs preparation inside the cycle; the result is the same
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
@@ -70,9 +63,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let recording = arguments.output.clone().unwrap_or_else(|| default_recording(&arguments.program));
     let inputs = [arguments.program.as_path()].into_iter().chain(arguments.machine.path());
     refuse_same_file(inputs.chain(arguments.surroundings.workshop_files()), &recording)?;
-    let rate = RecordRate::from_word(&arguments.record_rate).unwrap_or_default();
-    let signals = parse_signals(arguments.record.as_deref(), &machine)?;
-    let mut signals = signals.at_rate(rate).decimated(arguments.record_decimate).until_rest(arguments.record_to_rest);
+    check_page(arguments, &recording)?;
+    let mut signals = arguments.recorded.signals(&machine)?.until_rest(arguments.record_to_rest);
     if arguments.no_drives {
         // Without drives every wire behind the set-point is a copy of it: only what was computed is recorded.
         signals = signals.and(&SignalChoice::setpoints());
@@ -83,7 +75,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
         overrides: arguments.panel.overrides()?,
         drives: !arguments.no_drives,
         recording: Some(&recording),
-        mantissa_bits: arguments.record_precision,
+        mantissa_bits: arguments.recorded.record_precision,
         signals,
         threads: arguments.threads.into(),
         pace_ratio: arguments.pace,
@@ -94,18 +86,29 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     });
     drop(line);
     let outcome = outcome.map_err(|error| Failure::unreadable(error.0))?;
-    report(&outcome, Some(&recording), &Style { json: arguments.json, drives: !arguments.no_drives })
+    // The page first: the document on stdout names it only when it is there. A run that an alarm ended has one, too.
+    let page = arguments.report.as_ref().map(|page| write_of_recording(&recording, page).map(|_| page)).transpose()?;
+    let style = Style { json: arguments.json, drives: !arguments.no_drives, page: page.cloned() };
+    report(&outcome, Some(&recording), &style)
 }
 
-pub(super) fn parse_signals(text: Option<&str>, machine: &Loaded) -> Result<SignalChoice, Failure> {
-    let Some(text) = text else { return Ok(SignalChoice::all()) };
-    SignalChoice::parse(text, &machine.machine).map_err(Failure::unreadable)
+/// The page must not be an input or the recording.
+fn check_page(arguments: &RunArguments, recording: &std::path::Path) -> Result<(), Failure> {
+    let Some(page) = &arguments.report else { return Ok(()) };
+    let inputs = [arguments.program.as_path(), recording].into_iter().chain(arguments.machine.path());
+    if page == recording {
+        let finding = Diagnostic::error("C0001", format!("`{}` is both recording and page", page.display()));
+        return Err(Failure::unreadable(finding.help("give another name to --report")));
+    }
+    refuse_same_file(inputs.chain(arguments.surroundings.workshop_files()), page)
 }
 
 /// How to show an outcome.
 pub(super) struct Style {
     pub(super) json: bool,
     pub(super) drives: bool,
+    /// The page that was written.
+    pub(super) page: Option<PathBuf>,
 }
 
 /// Findings to stderr, figures to stdout; exit code 1 on an alarm.
@@ -123,7 +126,11 @@ pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &
         show([&Diagnostic::note("K0004", message)]);
     }
     if style.json {
-        print_json(&document(&outcome.summary, recording))?;
+        let mut document = document(&outcome.summary, recording);
+        if let Some(page) = &style.page {
+            document["report"] = json!(page.display().to_string());
+        }
+        print_json(&document)?;
     } else {
         print(&figures_text(&outcome.summary, style))?;
         if let (Some(path), Some(recorded)) = (recording, &outcome.recording) {
@@ -133,6 +140,9 @@ pub(super) fn report(outcome: &RunOutcome, recording: Option<&PathBuf>, style: &
                 recorded.bytes as f64 / 1e6,
                 path.display()
             ))?;
+        }
+        if let Some(page) = &style.page {
+            print(&format!("page: {}\n", page.display()))?;
         }
     }
     if outcome.alarm.is_some() { Err(Failure::told()) } else { Ok(()) }

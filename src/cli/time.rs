@@ -78,7 +78,7 @@ pub(super) fn time(arguments: &TimeArguments) -> Result<(), Failure> {
             }
             documents.push(document);
         } else {
-            print(&figures_text(&outcome.summary, &Style { json: false, drives: false }))?;
+            print(&figures_text(&outcome.summary, &Style { json: false, drives: false, page: None }))?;
             if let Some(optimum) = &optimum {
                 print(&optimum_text(optimum, outcome.summary.cycle_time_s))?;
             }

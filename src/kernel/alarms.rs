@@ -1,7 +1,7 @@
 //! The alarms of a drive: what its signals say, and what a person reads.
 //!
 //! In: the row of an axis at a position tick. Out: the alarm that ends the run, with the number that the control gives it. A `follow`
-//! runs on: what its drives are given may well be what no control would. Does not stop the axes: a run ends where the alarm stands.
+//! runs on with a warning: what its drives are given may well be what no control would. Does not stop the axes: a run ends where the alarm stands.
 
 use super::cycle::AxisRow;
 use crate::base::{AxisId, AxisKind, Diagnostic, Tick, units};
@@ -9,11 +9,12 @@ use crate::drive::monitoring;
 use crate::machine::Machine;
 
 /// What the control would stop for, if anything: the first of contour, positioning and standstill monitoring.
-pub(super) fn monitored(machine: &Machine, line: u32, row: &AxisRow) -> Option<Diagnostic> {
+pub(super) fn monitored(machine: &Machine, line: Option<u32>, row: &AxisRow) -> Option<Diagnostic> {
     let AxisRow { tick, axis, signals, .. } = *row;
     let seen = signals.monitoring & (monitoring::CONTOUR | monitoring::POSITIONING | monitoring::STANDSTILL);
     let drive = machine.axis(axis).drive.as_ref().filter(|_| seen != 0)?;
     let name = &machine.axis(axis).name;
+    let line = line.map_or(String::new(), |line| format!(", line {line}"));
     let unit = if machine.axis(axis).kind == AxisKind::Linear { "um" } else { "deg" };
     let shown = |value_lu: f64| length(machine.axis(axis).kind, value_lu);
     let time_s = machine.cycle.time_base.time_s(tick);
@@ -21,7 +22,7 @@ pub(super) fn monitored(machine: &Machine, line: u32, row: &AxisRow) -> Option<D
     let (code, message, help) = if seen & monitoring::CONTOUR != 0 {
         let (off, allowed) = (shown(signals.contour_deviation_lu.abs()), shown(drive.monitoring.contour_lu));
         let message = format!(
-            "axis {name} at {time_s:.4} s, line {line}: contour monitoring, {off} from where the control's model of the axis is, more than {allowed} \
+            "axis {name} at {time_s:.4} s{line}: contour monitoring, {off} from where the control's model of the axis is, more than {allowed} \
              (alarm 25050, MD36400)"
         );
         let help = format!(
@@ -32,7 +33,7 @@ pub(super) fn monitored(machine: &Machine, line: u32, row: &AxisRow) -> Option<D
     } else if seen & monitoring::POSITIONING != 0 {
         let (window, within_s) = (shown(drive.in_position_fine_lu), drive.monitoring.positioning_time_s);
         let message = format!(
-            "axis {name} at {time_s:.4} s, line {line}: positioning monitoring, still {away} from its set-point and not within {window} after {within_s} s \
+            "axis {name} at {time_s:.4} s{line}: positioning monitoring, still {away} from its set-point and not within {window} after {within_s} s \
              (alarm 25080, MD36020, MD36010)"
         );
         let help = format!(
@@ -43,7 +44,7 @@ pub(super) fn monitored(machine: &Machine, line: u32, row: &AxisRow) -> Option<D
     } else {
         let allowed = shown(drive.monitoring.standstill_lu);
         let message = format!(
-            "axis {name} at {time_s:.4} s, line {line}: standstill monitoring, {away} from its set-point at rest, more than {allowed} (alarm 25040, MD36030)"
+            "axis {name} at {time_s:.4} s{line}: standstill monitoring, {away} from its set-point at rest, more than {allowed} (alarm 25040, MD36030)"
         );
         let help =
             format!("a load moves it, or it swings: see axes.{name}.drive.standstill_{unit} and standstill_delay_ms");

@@ -8,6 +8,7 @@ use super::alarms::{diverged, monitored};
 use super::contour_error::ContourErrorMeter;
 use super::figures::Figures;
 use super::in_position::InPositionWire;
+use super::inner_rows::InnerRows;
 use super::preparation::{Findings, PieceSource, Preparation};
 use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
@@ -67,12 +68,7 @@ const BEGUN_USUAL: usize = 64;
 struct PositionCycle {
     ticks: u64,
     fine: FineInterpolator,
-    /// Current cycle of a drive, 0 without one.
-    current_ticks: u64,
-    /// Current cycles in a speed cycle.
-    speed_ratio: u32,
-    /// A row every so many current cycles; 0: at the position tick alone.
-    row_every: u32,
+    rows: InnerRows,
 }
 
 impl PositionCycle {
@@ -80,9 +76,8 @@ impl PositionCycle {
     fn new(machine: &Machine, axis: &Axis, drives: bool) -> Self {
         let drive = axis.drive.as_ref().filter(|_| drives);
         let ticks = drive.map_or(machine.cycle.time_base.ticks_per_setpoint(), |drive| drive.position_cycle_ticks);
-        let current_ticks = drive.map_or(0, |drive| drive.current_cycle_ticks);
-        let speed_ratio = drive.map_or(0, |drive| (drive.speed_cycle_ticks / current_ticks.max(1)) as u32);
-        Self { ticks, fine: FineInterpolator::new(machine, ticks), current_ticks, speed_ratio, row_every: 0 }
+        let fine = FineInterpolator::new(machine, ticks);
+        Self { ticks, fine, rows: InnerRows::default() }
     }
 }
 
@@ -193,12 +188,10 @@ impl<S: PieceSource> Kernel<S> {
 
     /// With rows of every axis at the rate of its speed or current loop. Figures count position ticks in any case.
     pub fn with_rows_at(mut self, rate: RecordRate) -> Self {
-        for cycle in &mut self.position_cycles {
-            cycle.row_every = match rate {
-                RecordRate::Position => 0,
-                RecordRate::Speed => cycle.speed_ratio,
-                RecordRate::Current => u32::from(cycle.current_ticks > 0),
-            };
+        let drives = self.machine.axes.iter().zip(&self.drives);
+        for (cycle, (axis, drive)) in self.position_cycles.iter_mut().zip(drives) {
+            let driven = matches!(drive, Drive::Cascade(_));
+            cycle.rows = InnerRows::new(axis.drive.as_ref().filter(|_| driven), rate);
         }
         self.sorts_rows = rate != RecordRate::Position;
         self
@@ -289,26 +282,24 @@ impl<S: PieceSource> Kernel<S> {
                 };
                 let drive = &mut self.drives[axis.index()];
                 let tick = Tick(setpoint.tick.0 + offset);
-                let signals = match cycle.row_every {
-                    0 => drive.step(input),
-                    _ if last => drive.step(input),
-                    every => {
-                        let row = |tick, signals| AxisRow { tick, axis, setpoint: sent, signals };
-                        inner_rows(drive, input, every, |n, signals| {
-                            self.output.rows.push(row(Tick(tick.0 + u64::from(n) * cycle.current_ticks), signals));
-                        })
+                let row = |tick, signals| AxisRow { tick, axis, setpoint: sent, signals };
+                let signals = match last {
+                    true => drive.step(input),
+                    false => {
+                        let rows = &mut self.output.rows;
+                        cycle.rows.step(drive, input, tick, |tick, signals| rows.push(row(tick, signals)))
                     }
                 };
                 if !drive.is_finite() {
                     return Err(diverged(&self.machine, axis, tick));
                 }
                 self.figures.drive(axis, &signals);
-                let row = AxisRow { tick, axis, setpoint: sent, signals };
+                let row = row(tick, signals);
                 self.output.rows.push(row);
                 if let Some(wait) = &wait {
                     self.in_position.hear(tick, axis, wait, &signals);
                 }
-                if let Some(alarm) = monitored(&self.machine, setpoint.path.block.line, &row) {
+                if let Some(alarm) = monitored(&self.machine, Some(setpoint.path.block.line), &row) {
                     return Err(alarm);
                 }
             }
@@ -355,17 +346,4 @@ impl<S: PieceSource> Kernel<S> {
     pub fn take_findings(&mut self) -> Findings {
         self.source.take_findings()
     }
-}
-
-/// One position cycle. Returns the signals at its tick, and gives `each` those at every `every`-th current tick behind it.
-fn inner_rows(drive: &mut Drive, input: DriveInput, every: u32, mut each: impl FnMut(u32, AxisSignals)) -> AxisSignals {
-    let mut first = AxisSignals::default();
-    drive.step_each(input, |n, signals| {
-        if n == 0 {
-            first = *signals;
-        } else if n.is_multiple_of(every) {
-            each(n, *signals);
-        }
-    });
-    first
 }

@@ -3,18 +3,19 @@
 //! In: [`SetpointTable`]. Out: axis rows, as the running kernel records them. Velocity, acceleration and jerk of the set-point are
 //! backward differences here: a table has no analytic ones. Does not plan or interpolate.
 
-use super::alarms::diverged;
+use super::alarms::{diverged, monitored};
 use super::cycle::AxisRow;
 use super::figures::Figures;
+use super::inner_rows::InnerRows;
 use super::record::{FollowRow, record_alarm, record_follow};
 use super::setpoint_table::{SetpointTable, row_ticks};
 use super::summary::{RunSummary, Warning, drive_warnings};
-use crate::base::{Diagnostic, MachinePoint, PerAxis, Tick};
+use crate::base::{Diagnostic, MachinePoint, PerAxis, Severity, Tick};
 use crate::drive::{Drive, DriveInput, Start};
 use crate::interpolator::AxisSetpoint;
 use crate::kinematics::Kinematics;
 use crate::machine::{Loaded, Machine};
-use crate::recorder::{Recorder, RecordingSetup, SignalChoice};
+use crate::recorder::{RecordRate, Recorder, RecordingSetup, SignalChoice};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -57,7 +58,7 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
             Some(Recorder::to_file(path, &setup)?)
         }
     };
-    let mut follower = Follower::new(machine, table, options.start);
+    let mut follower = Follower::new(machine, table, options);
     let mut alarm = None;
     while follower.next_row < table.rows && alarm.is_none() {
         match follower.step(table) {
@@ -77,6 +78,8 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
         warnings.push(Diagnostic::warning("F0012", message));
     }
     warnings.extend(drive_warnings(machine, true));
+    let stopped = machine.axis_ids().filter_map(|axis| follower.stopped[axis].take());
+    warnings.extend(stopped.map(|alarm| Diagnostic { severity: Severity::Warning, ..alarm }));
     let summary = summary(machine, &follower.figures, rows, &warnings, alarm.as_ref());
     if let Some(mut recorder) = recorder {
         if let Some(alarm) = &alarm {
@@ -119,12 +122,19 @@ struct Follower<'a> {
     actual: PerAxis<f64>,
     setpoints: PerAxis<AxisSetpoint>,
     rows: Vec<AxisRow>,
+    /// By axis.
+    inner: Vec<InnerRows>,
+    /// An axis gives more than one row a position cycle.
+    sorts_rows: bool,
+    /// For what a control would have stopped an axis first.
+    stopped: PerAxis<Option<Diagnostic>>,
     next_row: usize,
 }
 
 impl<'a> Follower<'a> {
     /// Axes without a column stand at home.
-    fn new(machine: &'a Machine, table: &SetpointTable, start: Start) -> Self {
+    fn new(machine: &'a Machine, table: &SetpointTable, options: &FollowOptions<'_>) -> Self {
+        let (start, rate) = (options.start, options.signals.rate());
         let mut sent = PerAxis::from_fn(|axis| machine.axes.get(axis.index()).map_or(0.0, |axis| axis.home_lu));
         for (axis, positions) in &table.positions {
             sent[*axis] = positions[0];
@@ -139,6 +149,9 @@ impl<'a> Follower<'a> {
             actual: sent,
             setpoints: PerAxis::default(),
             rows: Vec::with_capacity(machine.axes.len()),
+            inner: machine.axes.iter().map(|axis| InnerRows::new(axis.drive.as_ref(), rate)).collect(),
+            sorts_rows: rate != RecordRate::Position,
+            stopped: PerAxis::from_fn(|_| None),
             next_row: 0,
         }
     }
@@ -161,18 +174,28 @@ impl<'a> Follower<'a> {
             let setpoint = differentiate(&self.setpoints[axis], self.sent[axis], period_s, row == 0);
             let load_n_m = table.loads.iter().find(|(loaded, _)| *loaded == axis).map_or(0.0, |(_, loads)| loads[row]);
             let drive = &mut self.drives[axis.index()];
-            let signals = drive.step(DriveInput {
-                position_setpoint_lu: setpoint.position_lu,
-                load_n_m,
-                feedforward_active: true,
-            });
+            let input = DriveInput { position_setpoint_lu: setpoint.position_lu, load_n_m, feedforward_active: true };
+            let row_at = |tick, signals| AxisRow { tick, axis, setpoint, signals };
+            let signals = if row + 1 == table.rows {
+                drive.step(input)
+            } else {
+                let rows = &mut self.rows;
+                self.inner[axis.index()].step(drive, input, tick, |tick, signals| rows.push(row_at(tick, signals)))
+            };
             if !drive.is_finite() {
                 return Err(diverged(machine, axis, tick));
             }
             self.setpoints[axis] = setpoint;
             self.actual[axis] = signals.position_actual_lu;
             self.figures.drive(axis, &signals);
-            self.rows.push(AxisRow { tick, axis, setpoint, signals });
+            let now = row_at(tick, signals);
+            self.rows.push(now);
+            if self.stopped[axis].is_none() {
+                self.stopped[axis] = monitored(machine, None, &now);
+            }
+        }
+        if self.sorts_rows {
+            self.rows.sort_unstable_by_key(|row| (row.tick, row.axis));
         }
         self.next_row += 1;
         let tools = [self.sent, self.actual].map(|posture| self.kinematics.tool_pose(&MachinePoint(posture)));

@@ -10,6 +10,7 @@ mod cycle;
 mod figures;
 mod follow;
 mod in_position;
+mod inner_rows;
 mod preparation;
 mod record;
 mod run;

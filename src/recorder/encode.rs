@@ -79,8 +79,25 @@ impl AxisEncoder {
                 (FieldUnit::AxisLength, AxisKind::Rotary) => deg_from_rad(inside),
                 _ => inside,
             };
-            prost::encoding::double::encode(tag, &self.precision.round(value), buffer);
+            push_double(tag, self.precision.round(value), buffer);
         }
+    }
+}
+
+/// A field of wire type 1, as protobuf has it: key, then eight bytes. In one piece: this is most of what a recording is made of.
+#[inline]
+fn push_double(tag: u32, value: f64, buffer: &mut Vec<u8>) {
+    let key = tag << 3 | 1;
+    let [low, high] = [(key & 0x7f) as u8, (key >> 7) as u8];
+    let mut bytes = [0; 10];
+    bytes[2..].copy_from_slice(&value.to_le_bytes());
+    // Tags of this message stay below 2^11: a key has two bytes at most.
+    if high == 0 {
+        bytes[1] = low;
+        buffer.extend_from_slice(&bytes[1..]);
+    } else {
+        (bytes[0], bytes[1]) = (low | 0x80, high);
+        buffer.extend_from_slice(&bytes);
     }
 }
 

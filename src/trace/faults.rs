@@ -4,6 +4,8 @@
 
 use crate::base::Diagnostic;
 
+/// Times beyond 300 years are none: they would not fit the nanoseconds of a recording.
+pub(super) const TIME_MAX_S: f64 = 1e10;
 /// Sorts of faults that are kept apart.
 const SORTS_MAX: usize = 32;
 

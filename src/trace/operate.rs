@@ -3,7 +3,7 @@
 //! In: the text of a session, read as a stream; no entity is expanded. Out: heads and rows for a [`Sink`], notes about what was repaired.
 //! Attributes are found by name, records are sparse, frames follow one another with a gap between. Memory: one tag and one row.
 
-use super::faults::Faults;
+use super::faults::{Faults, TIME_MAX_S};
 use super::import::{About, ImportOptions};
 use super::instants::instant_s;
 use super::naming::{NamedHead, Naming, operate_name};
@@ -54,6 +54,8 @@ struct Session<'s, 'o> {
     frame: Frame,
     pending: Vec<(usize, f64)>,
     pending_s: Option<f64>,
+    /// Instant of the last row that was handed on; later rows must be later.
+    floor_s: f64,
     /// Row in which a column last had a value: an attribute may stand twice.
     stamp: Vec<u64>,
     rows: u64,
@@ -86,6 +88,7 @@ impl<'s, 'o> Session<'s, 'o> {
             frame: Frame::default(),
             pending: Vec::new(),
             pending_s: None,
+            floor_s: f64::NEG_INFINITY,
             stamp: Vec::new(),
             rows: 0,
             faults: Faults::default(),
@@ -207,7 +210,11 @@ impl<'s, 'o> Session<'s, 'o> {
         if let (Some(gap_s), true) = (gap.at_s, self.begun) {
             self.flush()?;
             let nothing: Vec<(usize, f64)> = (0..self.heads.len()).map(|column| (column, f64::NAN)).collect();
-            self.sink.row(gap_s, &nothing)?;
+            if gap_s > self.floor_s {
+                self.sink.row(gap_s, &nothing)?;
+                self.floor_s = gap_s;
+            }
+            self.pending_s = None;
         }
         Ok(())
     }
@@ -328,7 +335,7 @@ impl<'s, 'o> Session<'s, 'o> {
             };
             let key = attribute.key.as_ref();
             if key == "time" {
-                time_s = attribute.value.trim().parse::<f64>().ok().filter(|time| time.is_finite());
+                time_s = attribute.value.trim().parse::<f64>().ok().filter(|time| time.abs() < TIME_MAX_S);
                 continue;
             }
             let column = match id_number(key) {
@@ -360,7 +367,7 @@ impl<'s, 'o> Session<'s, 'o> {
                 }
                 return Ok(());
             }
-            Some(pending_s) if time_s < pending_s => {
+            _ if time_s <= self.floor_s || self.pending_s.is_some_and(|pending_s| time_s < pending_s) => {
                 self.pending.truncate(first);
                 self.faults.count("T0009", "a record is earlier than the one before and is left out", at);
                 return Ok(());
@@ -397,7 +404,7 @@ impl<'s, 'o> Session<'s, 'o> {
 
     /// Hands the pending row on.
     fn flush(&mut self) -> Result<(), Diagnostic> {
-        let Some(time_s) = self.pending_s else { return Ok(()) };
+        let Some(time_s) = self.pending_s.take() else { return Ok(()) };
         if !self.pending.is_empty() {
             self.frame.row(time_s);
             let (stamp, counts, row) = (&mut self.stamp, &mut self.frame.counts, self.rows);
@@ -408,6 +415,7 @@ impl<'s, 'o> Session<'s, 'o> {
                 fresh
             });
             self.sink.row(time_s, &self.pending)?;
+            self.floor_s = time_s;
             self.rows += 1;
         }
         self.pending.clear();

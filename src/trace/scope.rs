@@ -5,7 +5,7 @@
 
 use super::columns::named_head;
 use super::delimited::{cells, number};
-use super::faults::Faults;
+use super::faults::{Faults, TIME_MAX_S};
 use super::import::{About, ImportOptions};
 use super::naming::{NamedHead, Naming};
 use super::sink::{Head, Layout, Sink};
@@ -175,7 +175,7 @@ fn take_row(
         } else {
             (periods_s.get(channel).copied().flatten().map(|period_s| index as f64 * period_s), read(channel))
         };
-        let (Some(time_s), Some(value)) = (time_s.filter(|time| time.is_finite()), value) else { continue };
+        let (Some(time_s), Some(value)) = (time_s.filter(|time| time.abs() < TIME_MAX_S), value) else { continue };
         if entry.times_s.last().is_some_and(|last| time_s <= *last) {
             faults.count("T0009", "a sample is not later than the one before and is left out", at);
             continue;

@@ -53,6 +53,8 @@ const VALUES_MAX: usize = 300_000_000;
 const FILLED_MAX: usize = 64_000_000;
 /// Times of a file may miss its grid by this share of a period: they are printed with few digits.
 const OFF_GRID_SHARE: f64 = 0.01;
+/// A period must be so much larger than the last bit of the times.
+const RESOLUTION: f64 = 64.0 * f64::EPSILON;
 /// Tolerance of times that make a grid where no period is known: the last digit of most files is a microsecond or less.
 const TIME_TOLERANCE_S: f64 = 0.6e-6;
 
@@ -120,11 +122,15 @@ impl Memory {
         let (Some(period_s), Some(&first), Some(&last)) = (head.period_s, times.first(), times.last()) else {
             return (TimeGrid::from_times(times, TIME_TOLERANCE_S), values);
         };
+        if period_s <= first.abs().max(last.abs()) * RESOLUTION {
+            return (TimeGrid::from_times(times, TIME_TOLERANCE_S), values);
+        }
         let slot = |time_s: f64| (time_s - first) / period_s;
         let off_grid = |time_s: &f64| (slot(*time_s) - slot(*time_s).round()).abs() > OFF_GRID_SHARE;
         let count = slot(last).round() + 1.0;
         let room = (FILLED_MAX.saturating_sub(self.filled) + values.len()) as f64;
-        if count > room || times.iter().any(off_grid) {
+        let joined = |pair: &[f64]| slot(pair[1]).round() <= slot(pair[0]).round();
+        if count > room || times.iter().any(off_grid) || times.windows(2).any(joined) {
             return irregular(head, period_s, &times, &values);
         }
         let count = count as usize;

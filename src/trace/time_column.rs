@@ -4,7 +4,7 @@
 //! time that is later than the one before, or passes the row over and counts it. Says how it was found.
 
 use super::delimited::Dialect;
-use super::faults::Faults;
+use super::faults::{Faults, TIME_MAX_S};
 use super::import::ImportOptions;
 use super::instants::instant_s;
 use super::unit_words::{unit_and_factor, unit_in_name};
@@ -150,6 +150,10 @@ impl TimeColumn {
             time_s = if exact { time_s / per_s } else { time_s * self.scale_s };
         } else {
             time_s *= self.scale_s;
+        }
+        if time_s.abs() >= TIME_MAX_S {
+            faults.count("T0009", "a row has no sensible time and is left out", at);
+            return None;
         }
         if self.last_s.is_some_and(|last_s| time_s <= last_s) {
             faults.count("T0009", "a row is not later than the one before and is left out", at);

@@ -307,7 +307,9 @@ fn uniform(times: &[f64], tolerance_s: f64) -> Option<(f64, f64)> {
     let on_grid = |(index, time): (usize, &f64)| {
         ((start_ns + index as f64 * step_ns) / NS_PER_S - time).abs() <= tolerance_s + time.abs() * f64::EPSILON
     };
-    (step_ns > 0.0 && times.iter().enumerate().all(on_grid)).then_some((start_ns, step_ns))
+    // Below the last bit of the times the instants of a grid would fall together.
+    let finest_ns = 64.0 * f64::EPSILON * (last * NS_PER_S).abs().max(start_ns.abs());
+    (step_ns > finest_ns && times.iter().enumerate().all(on_grid)).then_some((start_ns, step_ns))
 }
 
 /// How an imported signal relates to our signal of the same name: our value at t - `delay_s`, plus the difference of the zeros.

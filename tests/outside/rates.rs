@@ -10,13 +10,13 @@ const SPINNER: [&str; 2] = ["-m", "spinner_mvc850"];
 const CURRENT_TICKS: usize = 16;
 const SPEED_TICKS: usize = 8;
 
-fn at(rate: &str) -> Trace {
-    trace(&format!("rate_{rate}"), TEXT, &[&SPINNER[..], &["--record-rate", rate]].concat())
+fn at(test: &str, rate: &str) -> Trace {
+    trace(&format!("{test}_{rate}"), TEXT, &[&SPINNER[..], &["--record-rate", rate]].concat())
 }
 
 #[test]
 fn inner_loops_are_recorded_at_their_own_rate() {
-    let (position, speed, current) = (at("position"), at("speed"), at("current"));
+    let (position, speed, current) = (at("rates", "position"), at("rates", "speed"), at("rates", "current"));
     for axis in ["X", "Y", "Z"] {
         let (times, columns) = &position.axes[axis];
         let setpoints = times.len() - 1;
@@ -58,9 +58,38 @@ fn inner_loops_are_recorded_at_their_own_rate() {
     assert_eq!(figures(&position), figures(&current), "figures count position ticks");
 }
 
+/// The drives alone give the same rows between the position cycles as the drives behind the interpolator.
+#[test]
+fn follow_records_the_inner_loops_as_run_does() {
+    let (position, current) = (at("follow", "position"), at("follow", "current"));
+    let output = position.path.with_file_name("followed.mcap");
+    let follow = Command::new(env!("CARGO_BIN_EXE_sollwert"))
+        .arg("follow")
+        .arg(&position.path)
+        .args(SPINNER)
+        .args(["--record-rate", "current", "--record", "X.current,Y.*,Z", "-o"])
+        .arg(&output)
+        .output()
+        .unwrap();
+    assert!(follow.status.success(), "{}", String::from_utf8_lossy(&follow.stderr));
+    let recording = Recording::open(&output).unwrap();
+    let field = axis_field("current").unwrap();
+    let mut rows = [0; 3];
+    for message in recording.messages().unwrap().map(Result::unwrap) {
+        let Content::Axis(sample) = message.content else { continue };
+        let (k, axis) = (rows[message.topic], ["X", "Y", "Z"][message.topic]);
+        assert_eq!(
+            (message.time_ns, sample.get(field).unwrap()),
+            (k as u64 * 62_500, current.column(axis, "current")[k])
+        );
+        rows[message.topic] += 1;
+    }
+    assert_eq!(rows, [current.column("X", "current").len(); 3]);
+}
+
 #[test]
 fn a_signal_may_be_recorded_less_often_than_others() {
-    let whole = at("position");
+    let whole = at("thin", "position");
     let words = ["--record", "X.position*, x.current/4,Y/10,Z.flags", "--record-decimate", "2"];
     let thin = trace("thinned", TEXT, &[&SPINNER[..], &words].concat()).path;
     let recording = Recording::open(&thin).unwrap();

@@ -153,7 +153,7 @@ fn an_archive_that_unpacks_without_end_is_refused() {
     let mut zip = zip::ZipWriter::new(std::fs::File::create(&archive).unwrap());
     let deflated = zip::write::SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Deflated)
-        .compression_level(Some(1));
+        .compression_level(Some(6));
     zip.start_file("a.json", deflated).unwrap();
     zip.write_all(header(CYCLE).as_bytes()).unwrap();
     // 120 MB of blanks make a tenth of one.

@@ -17,6 +17,9 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let edge = "{\"Header\":{\"CycleTimeMs\":2,\"SignalListHFData\":[{\"Address\":\"CYCLE\"},{\"Address\":\"DES_POS|1\"}]},\n\
         \"Payload\":[{\"HFData\":[[1,2.5],[2,3.5],[3,1e-3]]},{\"HFBlockEvent\":{\"HFProbeCounter\":2,\"SeekOffset\":4,\"GCode\":\"G1\"}},\
         {\"HFData\":[[4,2.5],[5,3.5]]}],\n\"Footer\":{}}\n";
+    let measuring = "<ResponseTestCustom><float name=\"m_dProcessUpdateTime\">0.000125</float><object name=\"a\">\
+        <NumericArray elementtype=\"double\" format=\"base85\"><raw name=\"m_pNumberArray\">..kLLiU.kLLiU.</raw></NumericArray>\
+        </object></ResponseTestCustom>";
     vec![
         ("xml", session.text().into_bytes()),
         ("csv", format!("time_s,X_mm,word\n{csv}").into_bytes()),
@@ -24,7 +27,13 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("halscope", format!("# Sampling period is 1000000 ns\njoint.0.pos-cmd;b\n{hal}").into_bytes()),
         ("halsampler", sampler.into_bytes()),
         ("edge", edge.as_bytes().to_vec()),
+        ("measuring", measuring.as_bytes().to_vec()),
     ]
+}
+
+/// Mutations of each file; `SOLLWERT_FUZZ_ROUNDS` asks for more.
+fn rounds() -> u32 {
+    std::env::var("SOLLWERT_FUZZ_ROUNDS").ok().and_then(|text| text.parse().ok()).unwrap_or(400)
 }
 
 fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
@@ -56,7 +65,7 @@ fn no_importer_falls_over_damaged_bytes() {
     for (format, bytes) in samples() {
         assert!(read(&format!("mutant_{format}"), &bytes, &ImportOptions::default()).is_ok(), "{format}");
         let mut random = Random::new(7);
-        for turn in 0..400 {
+        for turn in 0..rounds() {
             let mutant = mutated(&bytes, &mut random);
             // A panic shows the turn: the seed is fixed.
             let read =

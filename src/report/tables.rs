@@ -1,0 +1,255 @@
+//! Tables of figures as HTML.
+//!
+//! In: the figures of a run, one side of a comparison, a comparison. Out: HTML with every text escaped. Does not compute figures.
+
+use super::encode::escape;
+use crate::base::units::{MS_PER_S, UM_PER_MM, US_PER_S, percent_from_ratio};
+use crate::compare::{Comparison, Figures, LineTimes, PairFigures, Side};
+use serde_json::Value;
+use std::fmt::Write as _;
+
+/// Rows of a table of places at most.
+const ROWS_MAX: usize = 20;
+
+/// A table; the first row is the head, the first column holds names. Cells are escaped here.
+pub fn table(caption: &str, rows: &[Vec<String>]) -> String {
+    if rows.len() < 2 {
+        return String::new();
+    }
+    let mut html = format!("<figure class=\"table\"><figcaption>{}</figcaption><table>", escape(caption));
+    for (i, row) in rows.iter().enumerate() {
+        html += "<tr>";
+        for (k, cell) in row.iter().enumerate() {
+            let tag = if i == 0 || k == 0 { "th" } else { "td" };
+            let _ = write!(html, "<{tag}>{}</{tag}>", escape(cell));
+        }
+        html += "</tr>";
+    }
+    html + "</table></figure>"
+}
+
+/// Three significant digits.
+pub fn significant(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = (2 - value.abs().log10().floor() as i64).clamp(0, 9) as usize;
+    if value.abs() < 1e-7 { format!("{value:.2e}") } else { format!("{value:.digits$}") }
+}
+
+fn row(cells: &[&str]) -> Vec<String> {
+    cells.iter().map(|cell| (*cell).to_owned()).collect()
+}
+
+/// Figures of a run as its recording has them.
+pub fn run_tables(summary: &Value) -> String {
+    let number = |key: &str| summary.get(key).and_then(Value::as_f64);
+    let mut rows = vec![row(&["run", ""])];
+    let mut push = |name: &str, text: Option<String>| rows.extend(text.map(|text| vec![name.to_owned(), text]));
+    push("cycle time", number("cycle_time_s").map(|t| format!("{t:.3} s")));
+    push("at programmed feed (CAM time)", number("cam_time_s").map(|t| format!("{t:.3} s")));
+    push("cycle time / CAM time", number("time_ratio").map(|r| format!("{r:.3}")));
+    push("time at programmed feed", number("programmed_feed_share").map(|r| format!("{:.1} %", percent_from_ratio(r))));
+    push("path length", number("path_length_mm").map(|l| format!("{l:.3} mm")));
+    push("blocks", number("blocks").map(|n| format!("{n}")));
+    push("blended corners", number("corners_total").map(|n| format!("{n}")));
+    let alarm = summary.get("alarm").and_then(|alarm| alarm.get("message")).and_then(Value::as_str);
+    push("ended early by alarm", alarm.map(str::to_owned));
+    let mut html = table("Run", &rows);
+    if let Some(limits) = summary.get("limits").and_then(Value::as_object) {
+        let mut shares: Vec<(&String, f64)> = limits.iter().filter_map(|(k, v)| Some((k, v.as_f64()?))).collect();
+        shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut rows = vec![row(&["limit", "share of the time"])];
+        rows.extend(
+            shares.into_iter().map(|(name, share)| vec![name.clone(), format!("{:.1} %", percent_from_ratio(share))]),
+        );
+        html += &table("What limits the feed", &rows);
+    }
+    html + &axes_table(summary)
+}
+
+fn axes_table(summary: &Value) -> String {
+    let Some(axes) = summary.get("axes").and_then(Value::as_object) else { return String::new() };
+    let prefixes = [
+        ("velocity_max_", "velocity max"),
+        ("acceleration_max_", "acceleration max"),
+        ("jerk_max_", "jerk max"),
+        ("control_deviation_max_", "control deviation max"),
+        ("control_deviation_rms_", "rms"),
+        ("following_error_max_", "following error max"),
+        ("following_error_rms_", "rms"),
+    ];
+    let has = |prefix: &str| {
+        axes.values().any(|f| f.as_object().is_some_and(|fields| fields.keys().any(|k| k.starts_with(prefix))))
+    };
+    let shown: Vec<_> = prefixes.iter().filter(|(prefix, _)| has(prefix)).collect();
+    let mut rows =
+        vec![std::iter::once(String::new()).chain(shown.iter().map(|(_, title)| (*title).to_owned())).collect()];
+    for (name, figures) in axes {
+        let cell = |prefix: &str| {
+            let field = figures.as_object().and_then(|fields| fields.iter().find(|(key, _)| key.starts_with(prefix)));
+            field.and_then(|(key, value)| {
+                Some(format!("{} {}", significant(value.as_f64()?), unit(&key[prefix.len()..])))
+            })
+        };
+        let cells = shown.iter().map(|(prefix, _)| cell(prefix).unwrap_or_default());
+        rows.push(std::iter::once(name.clone()).chain(cells).collect());
+    }
+    table("Axes", &rows)
+}
+
+fn unit(suffix: &str) -> String {
+    suffix.replacen("_s", "/s", 1).replace("s2", "s²").replace("s3", "s³")
+}
+
+fn um(value_mm: f64) -> String {
+    format!("{} µm", significant(value_mm * UM_PER_MM))
+}
+
+fn contour_row(name: String, figures: &Figures) -> Vec<String> {
+    let at = format!("{:.3} s", figures.max_at_s);
+    vec![name, um(figures.rms), um(figures.max), at, um(figures.p95), um(figures.bias)]
+}
+
+/// Contour error, circles and corners of one side. `whose`: stands in the captions, empty for a report of one trace.
+pub fn side_tables(side: &Side, whose: &str) -> String {
+    let mut rows = vec![row(&["", "rms", "max", "at", "p95", "mean"])];
+    if let Some(own) = &side.own {
+        rows.push(contour_row(own.against.replace('_', " "), &own.contour.space));
+        rows.extend(own.contour.plane.iter().map(|plane| contour_row("in the plane, left +".to_owned(), plane)));
+    }
+    let mut html = table(&format!("Contour error{whose}"), &rows);
+    let mut delays = vec![row(&["axis", "delay of the set-point in the control deviation"])];
+    for (axis, delay_s, error_s) in &side.setpoint_delays_s {
+        delays.push(vec![axis.clone(), format!("{:.3} ± {:.3} ms", delay_s * MS_PER_S, error_s * MS_PER_S)]);
+    }
+    html += &table(&format!("Delays{whose}"), &delays);
+    html + &budget_table(side, whose) + &circle_table(side, whose) + &corner_table(side, whose)
+}
+
+fn budget_table(side: &Side, whose: &str) -> String {
+    let Some(budget) = &side.budget else { return String::new() };
+    let parts =
+        [("chords of the program", &budget.chord), ("interpolator", &budget.interpolator), ("drives", &budget.drives)];
+    let mut rows = vec![row(&["error", "rms", "max", "p95", "worst NC lines"])];
+    for (name, part) in parts {
+        let Some(part) = part else { continue };
+        let um = |value_um: f64| format!("{} µm", significant(value_um));
+        let worst =
+            part.worst.iter().take(5).map(|((_, line), error_um)| format!("{line} ({})", significant(*error_um)));
+        let f = &part.figures;
+        rows.push(vec![name.to_owned(), um(f.rms), um(f.max), um(f.p95), worst.collect::<Vec<_>>().join(", ")]);
+    }
+    table(&format!("Where the error comes from{whose}"), &rows)
+}
+
+fn circle_table(side: &Side, whose: &str) -> String {
+    let Some(own) = &side.own else { return String::new() };
+    let mut rows =
+        vec![row(&["circle", "R", "G", "G(b)", "F max", "F min", "F mean", "peaks behind 0, 90, 180, 270°"])];
+    for circle in own.features.circles.iter().take(ROWS_MAX) {
+        let um = |value_um: f64| format!("{value_um:.2} µm");
+        let way = if circle.counter_clockwise { "ccw" } else { "cw" };
+        let peaks = circle.quadrant_peaks_um.map(|peak| peak.map_or("–".to_owned(), |peak| format!("{peak:.2}")));
+        rows.push(vec![
+            format!("{} {way}, {:.3} s", circle.plane.concat(), circle.start_s),
+            format!("{:.3} mm", circle.radius_mm),
+            um(circle.deviation_um),
+            circle.bidirectional_um.map_or("–".to_owned(), um),
+            um(circle.radial_max_um),
+            um(circle.radial_min_um),
+            um(circle.radial_mean_um),
+            format!("{} µm", peaks.join(", ")),
+        ]);
+    }
+    table(&format!("Circles (ISO 230-4){whose}"), &rows)
+}
+
+fn corner_table(side: &Side, whose: &str) -> String {
+    let Some(own) = &side.own else { return String::new() };
+    let mut worst: Vec<_> = own.features.corners.iter().collect();
+    worst.sort_by(|a, b| b.overshoot_um.total_cmp(&a.overshoot_um).then(a.time_s.total_cmp(&b.time_s)));
+    let mut rows = vec![row(&["corner at", "angle", "overshoot", "cut", "X Y Z"])];
+    for corner in worst.iter().take(ROWS_MAX) {
+        rows.push(vec![
+            format!("{:.3} s", corner.time_s),
+            format!("{:.1}°", corner.angle_deg),
+            format!("{:.2} µm", corner.overshoot_um),
+            format!("{:.2} µm", corner.cut_um),
+            corner.point_mm.map(|x| format!("{x:.3}")).join(" "),
+        ]);
+    }
+    table(&format!("Corners that are overshot most, {} in all{whose}", worst.len()), &rows)
+}
+
+/// Everything that a comparison says.
+pub fn comparison_tables(comparison: &Comparison) -> String {
+    let [a, b] = &comparison.sides;
+    let mut rows = vec![row(&["comparison", ""])];
+    if let Some(at) = comparison.alignment {
+        let error = if at.uncertainty_s > 0.0 {
+            format!(" ± {} µs", significant(at.uncertainty_s * US_PER_S))
+        } else {
+            String::new()
+        };
+        rows.push(vec!["time offset (reference − trace)".to_owned(), format!("{:.6} s{error}", at.offset_s)]);
+        if at.drift_ratio != 0.0 {
+            rows.push(vec!["drift of the clocks".to_owned(), format!("{:.3} ppm", at.drift_ratio * 1e6)]);
+        }
+        if !comparison.aligned_by.is_empty() {
+            rows.push(vec!["aligned by".to_owned(), comparison.aligned_by.join(", ")]);
+        }
+    }
+    if let (Some(one), Some(other)) = (a.cycle_time_s, b.cycle_time_s) {
+        let text = format!("{one:.3} s against {other:.3} s: {:+.3} s ({})", one - other, a.cycle_time_basis);
+        rows.push(vec!["cycle time".to_owned(), text]);
+    }
+    let mut html = table("Comparison", &rows);
+    if let Some(found) = &comparison.contour {
+        let mut rows = vec![row(&["", "rms", "max", "at", "p95", "mean"])];
+        let name = if found.in_part { "tool tip in the part" } else { "in space" };
+        rows.push(contour_row(format!("{name}: {}", found.against.replace('_', " ")), &found.contour.space));
+        rows.extend(found.contour.plane.iter().map(|plane| contour_row(format!("in {}, left +", found.plane), plane)));
+        html += &table("Contour error, trace against reference", &rows);
+    }
+    html += &pair_table("Differences at equal times (trace − reference)", &comparison.pairs, |p| p.in_time.as_ref());
+    html += &pair_table("Differences at equal places on the path", &comparison.pairs, |p| p.along_path.as_ref());
+    html += &line_table(&comparison.lines);
+    let mut why = vec![row(&["signal of the trace", "signal of the reference", "why they are a pair"])];
+    why.extend(comparison.pairs.iter().map(|p| vec![p.name.clone(), p.reference_name.clone(), p.reason.clone()]));
+    html += &table("Pairs", &why);
+    html + &side_tables(a, ", trace") + &side_tables(b, ", reference")
+}
+
+fn pair_table(caption: &str, pairs: &[PairFigures], get: impl Fn(&PairFigures) -> Option<&Figures>) -> String {
+    let mut rows = vec![row(&["signal", "rms", "max", "at", "p95", "bias", "correlation", "delay", "unit"])];
+    for pair in pairs {
+        let Some(figures) = get(pair) else { continue };
+        rows.push(vec![
+            pair.name.clone(),
+            significant(figures.rms),
+            significant(figures.max),
+            format!("{:.3} s", figures.max_at_s),
+            significant(figures.p95),
+            significant(figures.bias),
+            figures.correlation_ratio.map_or(String::new(), |r| format!("{r:.5}")),
+            pair.delay_s.map_or(String::new(), |(delay_s, _)| format!("{:.3} ms", delay_s * MS_PER_S)),
+            pair.unit.clone(),
+        ]);
+    }
+    table(caption, &rows)
+}
+
+fn line_table(lines: &[LineTimes]) -> String {
+    let mut rows = vec![row(&["NC line", "trace", "reference", "difference", "contour error max"])];
+    for line in lines.iter().filter(|line| (line.trace_s - line.reference_s).abs() > 5e-4).take(ROWS_MAX) {
+        rows.push(vec![
+            format!("{} {}", line.program, line.line),
+            format!("{:.3} s", line.trace_s),
+            format!("{:.3} s", line.reference_s),
+            format!("{:+.3} s", line.trace_s - line.reference_s),
+            um(line.contour_error_max_mm),
+        ]);
+    }
+    table("NC lines whose time differs most", &rows)
+}
