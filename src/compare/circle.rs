@@ -244,6 +244,14 @@ fn extended(
             end += 1;
         }
     }
+    // Where the line turns back on itself, points near the turn fit both ways: there the run stays as it was found.
+    let on = |i: usize| from_centre(i).is_some_and(|p| (p[0].hypot(p[1]) - radius_mm).abs() <= slack_mm);
+    if on(end + 1) && !goes_on(end, end + 1) {
+        end = run.end;
+    }
+    if start > 0 && on(start - 1) && !goes_on(start - 1, start) {
+        start = run.start;
+    }
     start..end
 }
 
