@@ -63,7 +63,7 @@ fn the_first_commands_are_the_promised_two() {
 #[test]
 fn every_command_runs_as_it_stands() {
     let folder = folder("readme");
-    // The two inputs that the README leaves to its reader: set-points, and the recording of a run that was killed.
+    // What the README leaves to its reader: set-points, and the recording of a run that was killed.
     let rows: String = (0..200).map(|k| format!("{},{},0\n", f64::from(k) / 1000.0, f64::from(k) / 100.0)).collect();
     fs::write(folder.join("setpoints.csv"), format!("time_s,X_mm,Y_mm\n{rows}")).expect("set-points");
 
@@ -85,6 +85,8 @@ fn every_command_runs_as_it_stands() {
             if arguments[0] == "run" {
                 let whole = fs::read(&written).expect("the recording");
                 fs::write(folder.join("broken.mcap"), &whole[..whole.len() * 2 / 3]).expect("a broken recording");
+                // And the two that it compares.
+                ["a.mcap", "b.mcap"].map(|name| fs::write(folder.join(name), &whole).expect("a recording"));
             }
         }
         tried += 1;
