@@ -274,11 +274,16 @@ fn most_used_at_rest(chain: &Chain, profile: &Profile, index: usize, states: &[D
         let b = b_end * share.powf(power);
         let slope_lu_s2 = sign * power * b / (share * h);
         let bend = power * (power - 1.0) * b / (share * h).powi(2);
-        for (used, _) in used(interval, state, &PathPoint { speed_squared_lu2_s2: b, slope_lu_s2 }, bend) {
-            if used.is_nan() {
+        let point = PathPoint { speed_squared_lu2_s2: b, slope_lu_s2 };
+        for bound in &interval.bounds.axes {
+            let [acceleration, jerk] = demands(bound, state, &point, bend);
+            let jerk_ratio = jerk.abs() * b.sqrt() / bound.jerk_lu_s3.unwrap_or(f64::INFINITY);
+            let ratios = [acceleration.abs() / bound.acceleration_lu_s2, jerk_ratio];
+            // `max` would pass over what is no number.
+            if ratios.iter().any(|ratio| ratio.is_nan()) {
                 return f64::NAN;
             }
-            most = most.max(used);
+            most = ratios.into_iter().fold(most, f64::max);
         }
     }
     most
