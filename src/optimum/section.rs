@@ -37,6 +37,10 @@ const EXCEEDED_VELOCITY_RATIO: f64 = 1.0005;
 const TIGHTENINGS_MAX: usize = 4;
 const ALLOWED_RATIO: f64 = 1.0003;
 
+/// The control's motion is taken where it is faster by more than this share; so many places of each of its phases.
+const DRIVEN_GAIN_RATIO: f64 = 1e-3;
+const PHASE_PLACES: usize = 8;
+
 /// Where b comes out negative it begins again at this share of the least beside it.
 const DIP_RATIO: f64 = 0.1;
 
@@ -220,10 +224,11 @@ impl<'a> Section<'a> {
 
     fn motion(self, (profile, time_s): (Profile, f64)) -> OptimalMotion {
         let Self { pieces, grid, .. } = self;
-        // The control has a finer grid in some places: its motion is one of those among which the fastest is sought.
-        let driven_s = driven_s(pieces);
-        let (profile, time_s) =
-            if driven_s < time_s { (driven_profile(&grid, pieces), driven_s) } else { (profile, time_s) };
+        let path = pieces.iter().map(|piece| piece.path.clone()).collect();
+        let driven = driven_motion(pieces);
+        if driven.time_s < (1.0 - DRIVEN_GAIN_RATIO) * time_s {
+            return OptimalMotion { path, ..driven };
+        }
         let place = |index: usize| {
             let place_lu = match grid.intervals.get(index) {
                 Some(interval) => interval.place_lu,
@@ -232,18 +237,29 @@ impl<'a> Section<'a> {
             let velocity_lu_s = profile.squares[index].sqrt();
             SpeedPlace { place_lu, velocity_lu_s, acceleration_lu_s2: profile.slopes[index] / 2.0 }
         };
-        OptimalMotion {
-            time_s,
-            places: (0..profile.squares.len()).map(place).collect(),
-            path: pieces.iter().map(|piece| piece.path.clone()).collect(),
-        }
+        OptimalMotion { time_s, places: (0..profile.squares.len()).map(place).collect(), path }
     }
 }
 
-/// Time of the control for these pieces: those of a spline that was cut have one law.
-fn driven_s(pieces: &[Piece]) -> f64 {
-    let first = |index: usize| index == 0 || !Arc::ptr_eq(&pieces[index].driven.0, &pieces[index - 1].driven.0);
-    (0..pieces.len()).filter(|index| first(*index)).map(|index| pieces[index].driven.0.duration_s()).sum()
+/// The control's motion, without its path. Parts of a spline that was cut have one law.
+fn driven_motion(pieces: &[Piece]) -> OptimalMotion {
+    let (mut motion, mut start_lu) = (OptimalMotion::default(), 0.0);
+    for (index, Piece { driven: (law, _), .. }) in pieces.iter().enumerate() {
+        if index > 0 && Arc::ptr_eq(law, &pieces[index - 1].driven.0) {
+            continue;
+        }
+        for phase in law.phases() {
+            let places = (1..=PHASE_PLACES).map(|i| phase.at(phase.duration_s * i as f64 / PHASE_PLACES as f64));
+            motion.places.extend(places.filter(|state| state.velocity_lu_s > 0.0).map(|state| SpeedPlace {
+                place_lu: start_lu + state.position_lu,
+                velocity_lu_s: state.velocity_lu_s,
+                acceleration_lu_s2: state.acceleration_lu_s2,
+            }));
+        }
+        motion.time_s += law.duration_s();
+        start_lu += law.phases().last().map_or(0.0, |phase| phase.at(phase.duration_s).position_lu);
+    }
+    motion
 }
 
 /// The motion of the control.
