@@ -44,6 +44,9 @@ impl Interpreter {
         if self.modal.motion == Motion::Rapid {
             return Ok(Feed::Rapid);
         }
+        if let Some(thread) = &self.modal.thread {
+            return Ok(super::thread::thread_feed(thread, self.way_length(way)));
+        }
         if let Some(time_s) = words.block_time_s {
             let feed_lu_s = self.way_length(way) / time_s;
             // A block that leads nowhere takes no time either.

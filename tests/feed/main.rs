@@ -13,4 +13,5 @@ mod sampled;
 mod spindle;
 mod support;
 mod synchronised;
+mod thread;
 mod window;
