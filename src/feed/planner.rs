@@ -30,13 +30,13 @@ use crate::interpreter::{Event, Feed};
 use crate::kinematics::JointPath;
 use crate::machine::{BlendLaw, Machine, TimeLawKind};
 use crate::program::BlockRef;
-use crate::smoothing::{ContourPiece, PieceKind};
+use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 mod checks;
 mod flowing;
-mod threads;
+mod with_spindle;
 mod waits;
 
 use checks::{check_flow, check_motion, check_time};
@@ -75,8 +75,10 @@ pub struct Planner {
     spindle: Spindle,
     /// The thread that was pushed last, if the path does not rest after it.
     last_thread: Option<Before>,
-    /// Threads without room for run-in and run-out.
-    short_threads: Vec<(BlockRef, Diagnostic)>,
+    /// What a person should know, with its block.
+    findings: Vec<(BlockRef, Diagnostic)>,
+    /// A spindle that cannot follow a constant cutting speed has been told of.
+    late_told: bool,
     waits: Waits,
     /// What the printed blend law did.
     published: Tally,
@@ -163,7 +165,8 @@ impl Planner {
             arrivals: Arrivals::new(),
             spindle: Spindle::new(machine.spindle),
             last_thread: None,
-            short_threads: Vec::new(),
+            findings: Vec::new(),
+            late_told: false,
             waits: Waits::default(),
             published: Tally::default(),
             stalled: None,
@@ -199,8 +202,8 @@ impl Planner {
 
     /// What a person should know about the laws handed out so far, with the block where it began; each once.
     pub fn take_warning(&mut self) -> Option<(BlockRef, Diagnostic)> {
-        if !self.short_threads.is_empty() {
-            return Some(self.short_threads.remove(0));
+        if !self.findings.is_empty() {
+            return Some(self.findings.remove(0));
         }
         std::mem::take(&mut self.published).warning()
     }
@@ -293,35 +296,6 @@ impl Planner {
         Ok(())
     }
 
-    /// Before a feed that follows a change of the spindle speed, or begins with one, the path rests. What happens when the piece begins happens
-    /// when the wait does.
-    fn wait_for_spindle(&mut self, path: &mut JointPath) {
-        let contour = &mut path.contour;
-        let curve = contour.curve().filter(|curve| curve.length_lu() != 0.0);
-        let feeds = curve.is_some() && contour.feed != Feed::Rapid;
-        // A thread waits in its own law.
-        if !self.spindle.push(&contour.events, feeds) || contour.modes.thread.is_some() {
-            return;
-        }
-        let Some(at) = contour.curve().map(Curve::start) else { return };
-        let wait = ContourPiece {
-            kind: PieceKind::Wait { time_s: 0.0, at },
-            events: std::mem::take(&mut contour.events),
-            blocks_begun: 0,
-            block_length_lu: None,
-            stop_at_end: true,
-            ..contour.clone()
-        };
-        (self.last, self.last_thread) = (None, None);
-        self.entries.push_back(Entry {
-            path: JointPath { contour: wait, transformation: path.transformation.clone() },
-            motion: Motion::WaitsForSpindle,
-            corner: STOP,
-            rests_after: true,
-            entry: REST,
-        });
-    }
-
     /// No more pieces: the path ends at rest.
     pub fn finish(&mut self) {
         self.finished = true;
@@ -367,6 +341,9 @@ impl Planner {
                 None => front.fixed(self.entry, ahead, self.setpoint_period_s),
             },
         };
+        if let Some(tracked) = self.track_cutting(&front.path, &law) {
+            spindle = Some(tracked);
+        }
         if self.continuous.is_some() && !matches!(front.motion, Motion::Flows(_)) {
             self.stand_by(&front.path, &law);
         }

@@ -146,6 +146,7 @@ impl Modal {
             tool: self.tool.clone(),
             feedforward_active: self.feedforward_active,
             thread: self.thread.clone(),
+            cutting: None,
         }
     }
 

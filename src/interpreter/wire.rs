@@ -207,6 +207,27 @@ pub struct Modes {
     pub feedforward_active: bool,
     /// G33 and its kin: this block and the master spindle are one motion.
     pub thread: Option<Arc<Thread>>,
+    /// G96 and its kin: the master spindle follows the distance from its axis.
+    pub cutting: Option<Arc<CuttingSpeed>>,
+}
+
+/// A constant cutting speed: the speed of the spindle is `speed / radius`, within limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CuttingSpeed {
+    /// S under G96.
+    pub speed_mm_s: f64,
+    /// Its distance from 0 in the part is the radius.
+    pub axis: AxisId,
+    /// Lowest and highest speed: G25 S, LIMS and G26 S.
+    pub limits_rad_s: [f64; 2],
+}
+
+impl CuttingSpeed {
+    /// Speed of the spindle at a place, positive.
+    pub fn speed_rad_s(&self, position_mm: f64) -> f64 {
+        let [low_rad_s, high_rad_s] = self.limits_rad_s;
+        (self.speed_mm_s / position_mm.abs()).max(low_rad_s).min(high_rad_s)
+    }
 }
 
 /// How a block and the master spindle move together.
@@ -323,6 +344,7 @@ impl Modes {
             tool: None,
             feedforward_active: true,
             thread: None,
+            cutting: None,
         }
     }
 }

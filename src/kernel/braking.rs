@@ -64,7 +64,8 @@ impl<S: PieceSource> Kernel<S> {
         let until = (braking.next.0 / period + 1) * period;
         let mut rows: Vec<AxisRow> = std::mem::take(&mut self.output_mut().rows);
         rows.clear();
-        let mut stands = true;
+        // What is left of the tick of the alarm says nothing about the others.
+        let mut stands = braking.from == 0;
         while braking.next.0 < until {
             for axis in machine.axis_ids().skip(std::mem::take(&mut braking.from)) {
                 if !braking.next.0.is_multiple_of(self.position_ticks(axis)) {

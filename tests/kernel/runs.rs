@@ -246,7 +246,7 @@ fn a_clamped_axis_that_moves_is_an_alarm() {
         ["axes.X.drive.clamp_m_function=10", "axes.X.drive.release_m_function=11", "axes.X.drive.clamping_um=50"];
     let loaded = machine("spinner_mvc850", &sets);
     let path = scratch("clamped.mcap");
-    let outcome = record("G1 X30 F3000\nG4 F0.2\nM10\nG1 Y20\nX31\nM30\n", &loaded, 2, &path);
+    let outcome = record("G1 X30 F3000\nG4 F0.2\nM10\nG1 G9 Y20\nX31\nM30\n", &loaded, 2, &path);
     let alarm = outcome.alarm.expect("an alarm");
     assert!(alarm.code == "D0007" && alarm.message.contains("axis X") && alarm.message.contains("line 5"), "{alarm:?}");
     let measured = column(&path, "position_measured");

@@ -13,6 +13,9 @@ use std::f64::consts::{PI, TAU};
 /// Speeds below this share of that of positioning are rest.
 const REST_RATIO: f64 = 1e-9;
 
+/// Changes of the acceleration over one piece, at most.
+const STEPS_MAX: f64 = 200_000.0;
+
 /// Where the spindle is and will be.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
@@ -58,6 +61,40 @@ impl Course {
         let now = self.at(time_s);
         self.phases = vec![SpindlePhase { acceleration_rad_s2: 0.0, ..now }];
         self.ramp(speed_rad_s, acceleration_rad_s2);
+    }
+
+    /// Along a speed that changes, from the start of a piece to its end.
+    pub fn track(
+        &mut self,
+        start_s: f64,
+        duration_s: f64,
+        period_s: f64,
+        limit_rad_s2: Option<f64>,
+        wanted_rad_s: impl Fn(f64) -> f64,
+    ) -> f64 {
+        let steps = (duration_s / period_s).ceil().clamp(1.0, STEPS_MAX) as u32;
+        let step_s = duration_s / f64::from(steps);
+        let most_rad_s = limit_rad_s2.map_or(f64::INFINITY, |limit| limit * step_s);
+        let mut now = SpindlePhase { acceleration_rad_s2: 0.0, ..self.at(start_s) };
+        let mut off_share = 0.0_f64;
+        self.phases.clear();
+        for step in 1..=steps {
+            let wanted = wanted_rad_s(f64::from(step) * step_s);
+            let change_rad_s = (wanted - now.speed_rad_s).clamp(-most_rad_s, most_rad_s);
+            now.acceleration_rad_s2 = change_rad_s / step_s;
+            self.phases.push(now);
+            now = SpindlePhase { acceleration_rad_s2: 0.0, ..now.at(start_s + f64::from(step) * step_s) };
+            off_share = off_share.max((now.speed_rad_s / wanted - 1.0).abs());
+        }
+        self.phases.push(now);
+        off_share
+    }
+
+    /// To a speed, behind all that is planned.
+    pub fn turn_behind(&mut self, speed_rad_s: f64, acceleration_rad_s2: Option<f64>) {
+        if acceleration_rad_s2.is_some() {
+            self.ramp(speed_rad_s, acceleration_rad_s2);
+        }
     }
 
     /// To a position.
@@ -121,7 +158,10 @@ impl Course {
     fn ramp(&mut self, speed_rad_s: f64, acceleration_rad_s2: Option<f64>) {
         let start = self.last();
         let step_rad_s = speed_rad_s - start.speed_rad_s;
-        let Some(a) = acceleration_rad_s2.filter(|_| step_rad_s != 0.0) else {
+        if step_rad_s == 0.0 {
+            return;
+        }
+        let Some(a) = acceleration_rad_s2 else {
             self.phases = vec![SpindlePhase { speed_rad_s, acceleration_rad_s2: 0.0, ..start }];
             return;
         };

@@ -125,6 +125,23 @@ impl Spindle {
         };
     }
 
+    /// A constant cutting speed over a piece: `target_rad_s` is the speed that is asked for at a time of the piece, positive. Speed and acceleration
+    /// change once in `period_s`; the acceleration stays within its limit. The highest share by which the speed is off.
+    pub fn track(&mut self, start_s: f64, duration_s: f64, period_s: f64, target_rad_s: impl Fn(f64) -> f64) -> f64 {
+        let sense = self.begun.sense_ratio;
+        if sense == 0.0 || duration_s <= 0.0 {
+            return 0.0;
+        }
+        let limit_rad_s2 = self.settings.map(|settings| settings.acceleration_rad_s2);
+        let wanted = |time_s: f64| sense * target_rad_s(time_s);
+        let off_share = self.course.track(start_s, duration_s, period_s, limit_rad_s2, wanted);
+        // What G97 keeps, and from where S, M3 and M4 go on.
+        self.begun.speed_rad_s = target_rad_s(duration_s);
+        self.course.turn_behind(self.begun.target_rad_s(), limit_rad_s2);
+        self.fresh = true;
+        off_share
+    }
+
     /// When it is near the speed, or at the position, that was asked for last.
     pub fn ready_s(&self) -> f64 {
         self.ready_s

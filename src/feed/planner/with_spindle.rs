@@ -1,17 +1,53 @@
-//! Threads in the window: what is refused, and the law of the front piece.
+//! The spindle in the window: waits for it, threads and constant cutting speed, what is refused, and the law of the front piece.
 //!
 //! In: a piece with a thread, the spindle. Out: a [`ThreadPiece`] or an alarm; its [`TimeLaw`], and the motion of the spindle that it leads. Does not
 //! calculate laws: `thread` does.
 
 use super::{Entry, Motion, Planner};
 use crate::base::Diagnostic;
-use crate::base::units::rpm_from_rad_s;
+use crate::base::units::{percent_from_ratio, rpm_from_rad_s};
+use crate::feed::junction::STOP;
 use crate::feed::limits::Ends;
 use crate::feed::thread::{Before, ThreadPiece, TooFast, Turning};
 use crate::feed::{LimitKind, SpindleMotion, TimeLaw};
+use crate::geometry::Curve;
+use crate::interpreter::{Event, Feed};
 use crate::kinematics::JointPath;
+use crate::smoothing::{ContourPiece, PieceKind};
+
+/// A spindle whose speed is off by more under a constant cutting speed is told of.
+const OFF_SHARE_MAX: f64 = 0.1;
 
 impl Planner {
+    /// Before a feed that follows a change of the spindle speed, or begins with one, the path rests. What happens when the piece begins happens
+    /// when the wait does.
+    pub(super) fn wait_for_spindle(&mut self, path: &mut JointPath) {
+        let contour = &mut path.contour;
+        let curve = contour.curve().filter(|curve| curve.length_lu() != 0.0);
+        let feeds = curve.is_some() && contour.feed != Feed::Rapid;
+        // A thread waits in its own law.
+        if !self.spindle.push(&contour.events, feeds) || contour.modes.thread.is_some() {
+            return;
+        }
+        let Some(at) = contour.curve().map(Curve::start) else { return };
+        let wait = ContourPiece {
+            kind: PieceKind::Wait { time_s: 0.0, at },
+            events: std::mem::take(&mut contour.events),
+            blocks_begun: 0,
+            block_length_lu: None,
+            stop_at_end: true,
+            ..contour.clone()
+        };
+        (self.last, self.last_thread) = (None, None);
+        self.entries.push_back(Entry {
+            path: JointPath { contour: wait, transformation: path.transformation.clone() },
+            motion: Motion::WaitsForSpindle,
+            corner: STOP,
+            rests_after: true,
+            entry: super::REST,
+        });
+    }
+
     /// A thread that is pushed behind `before`. The alarm: an axis cannot follow the spindle.
     pub(super) fn thread(
         &mut self,
@@ -57,6 +93,28 @@ impl Planner {
         Diagnostic::error("P0006", message).help(format!("give S{most_rpm:.1} or less, or a smaller lead"))
     }
 
+    /// G96: the spindle over a piece with a constant cutting speed.
+    pub(super) fn track_cutting(&mut self, path: &JointPath, law: &TimeLaw) -> Option<SpindleMotion> {
+        let cutting = *path.contour.modes.cutting.as_deref()?;
+        let curve = path.contour.curve()?;
+        let target = |time_s: f64| cutting.speed_rad_s(curve.at(law.at(time_s).position_lu).position.0[cutting.axis]);
+        let off_share = self.spindle.track(self.elapsed_s, law.duration_s(), self.setpoint_period_s, target);
+        if off_share > OFF_SHARE_MAX
+            && path.contour.feed != Feed::Rapid
+            && !std::mem::replace(&mut self.late_told, true)
+        {
+            let block = path.contour.block;
+            let message = format!(
+                "the spindle cannot follow the cutting speed in line {}: its speed is off by {:.0} %, and F a revolution counts with the wanted one",
+                block.line,
+                percent_from_ratio(off_share)
+            );
+            let help = "limit the speed near the axis of rotation with LIMS, or lower the feed; reported once, for the first such block";
+            self.findings.push((block, Diagnostic::warning("P0008", message).help(help)));
+        }
+        self.spindle.hand_out(self.elapsed_s)
+    }
+
     /// The law of the thread at the front.
     pub(super) fn thread_law(
         &mut self,
@@ -84,7 +142,7 @@ impl Planner {
                 rpm_from_rad_s(piece.thread.speed_rad_s)
             );
             let help = format!("begin earlier, end later, or give S{:.1} or less", (most_rpm * 10.0).floor() / 10.0);
-            self.short_threads.push((block, Diagnostic::warning("P0007", message).help(help)));
+            self.findings.push((block, Diagnostic::warning("P0007", message).help(help)));
         }
         if !piece.thread.is_cut() {
             let motion = spindle.get_or_insert_with(|| self.spindle.motion(now_s));
@@ -101,7 +159,6 @@ fn no_thread(path: &JointPath) -> Diagnostic {
 }
 
 /// Events that make another spindle motion.
-fn turns(event: &crate::interpreter::Event) -> bool {
-    use crate::interpreter::Event;
+fn turns(event: &Event) -> bool {
     matches!(event, Event::MFunction(3 | 4 | 5 | 19) | Event::SpindlePosition(_))
 }
