@@ -343,14 +343,7 @@ impl Interpreter {
                 block.edge = Some((edge, columns.clone()));
                 block.events.push(Event::Edge(edge));
             }
-            Address::M => {
-                let number = whole(typed, columns, "M")?;
-                self.note_spindle(number);
-                m_function(number, block);
-                if number == SPINDLE_POSITION {
-                    self.home_spindle(block);
-                }
-            }
+            Address::M => self.m_word(whole(typed, columns, "M")?, block),
             Address::RoundingDistance => self.modal.rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?),
             Address::RapidRoundingDistance => {
                 self.modal.rapid_rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?)
@@ -385,6 +378,14 @@ impl Interpreter {
             | Address::MOf(_) => self.feed_address(address, typed, columns, block)?,
         }
         Ok(())
+    }
+
+    fn m_word(&mut self, number: u32, block: &mut Collected) {
+        self.note_spindle(number);
+        m_function(number, block);
+        if number == SPINDLE_POSITION {
+            self.home_spindle(block);
+        }
     }
 
     fn not_negative_mm(&self, typed: Typed, columns: &Columns) -> Outcome<f64> {

@@ -97,12 +97,12 @@ impl Spindle {
         if events.is_empty() {
             return;
         }
-        let positions = events.iter().filter_map(|event| match event {
+        let mut positions = events.iter().filter_map(|event| match event {
             Event::SpindlePosition(positioning) => Some(positioning),
             _ => None,
         });
         let changes = self.begun.take(events);
-        if let Some(positioning) = positions.last() {
+        if let Some(positioning) = positions.next_back() {
             let SpindlePositioning { angle_rad, approach, .. } = **positioning;
             self.course.position(time_s, Target { angle_rad, approach }, self.settings.as_ref());
             (self.ready_s, self.fresh) = (self.course.settled_s(), true);
