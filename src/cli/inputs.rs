@@ -263,6 +263,8 @@ pub(super) const SHIPPED_PROGRAMS: &[(&str, &str)] = &[
     ("corners.mpf", include_str!("../../programs/corners.mpf")),
     ("pocket.mpf", include_str!("../../programs/pocket.mpf")),
     ("spline.mpf", include_str!("../../programs/spline.mpf")),
+    ("tapping.mpf", include_str!("../../programs/tapping.mpf")),
+    ("thread.mpf", include_str!("../../programs/thread.mpf")),
 ];
 
 /// Opens a program, or a shipped one by its name where no file of that name exists.

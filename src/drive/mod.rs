@@ -10,7 +10,7 @@
 //!
 //! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal`,
 //! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `batch` steps
-//! many drives at once. `docs/drive.md` has
+//! many drives at once; `spindle` is how the master spindle lags. `docs/drive.md` has
 //! picture, law and code side by side.
 
 mod axis_drive;
@@ -35,6 +35,7 @@ mod position_loop;
 mod reversal;
 mod second_mass;
 mod speed_loop;
+mod spindle;
 mod transition;
 mod wire;
 
@@ -45,4 +46,5 @@ pub use frequency::{FrequencyResponses, GainMargin, LOWEST_HZ, LoopResponse, Pha
 pub use ideal::IdealDrive;
 pub use plant::{Piece, Plant, PlantState};
 pub use second_mass::{TwoMass, TwoMassPiece, TwoMassState};
+pub use spindle::{SpindleLag, SpindleSignals};
 pub use wire::*;

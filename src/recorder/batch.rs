@@ -5,7 +5,7 @@
 use super::event::EventRecord;
 use super::schema::ToolPose;
 use crate::base::{AxisId, Tick};
-use crate::drive::AxisSignals;
+use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
 use crate::program::{BlockRef, OpenedProgram};
 
@@ -30,6 +30,10 @@ pub(super) enum Record {
         sample: PathSample,
         contour_error_mm: Option<f64>,
     },
+    Spindle {
+        tick: Tick,
+        signals: SpindleSignals,
+    },
     Pose {
         tick: Tick,
         which: ToolPose,
@@ -52,6 +56,7 @@ impl Record {
         match self {
             Self::Axis { tick, .. }
             | Self::Path { tick, .. }
+            | Self::Spindle { tick, .. }
             | Self::Pose { tick, .. }
             | Self::Event { tick, .. }
             | Self::Program { tick, .. } => *tick,
