@@ -295,5 +295,6 @@ fn event_text(event: &Event) -> String {
         Event::Synchronised(action) => format!("$AC_OVR={}", trimmed(percent_from_ratio(action.override_ratio))),
         Event::CancelSynchronised(ids) => format!("CANCEL{ids:?}"),
         Event::Spindle(text) => text.to_string(),
+        Event::Programmed(block) => format!("programmed={}", block.motion.word()),
     }
 }

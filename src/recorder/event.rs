@@ -73,7 +73,9 @@ impl From<&Event> for EventRecord {
             Event::HFunction(value) => Self::HFunction(*value),
             Event::Spindle(text) => Self::Spindle(text.clone()),
             // The axes and the override themselves are on record.
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) => Self::BlockStart,
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::Programmed(_) => {
+                Self::BlockStart
+            }
         }
     }
 }

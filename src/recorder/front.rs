@@ -131,8 +131,10 @@ impl Recorder {
         if let Event::ProgramOpened(program) = event {
             self.attach_program(tick, program);
         }
-        if !matches!(event, Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_)) {
-            self.event(tick, Some(block), event.into());
+        match event {
+            Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) => {}
+            _ => self.event(tick, Some(block), event.into()),
         }
     }
 

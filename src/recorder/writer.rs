@@ -8,8 +8,8 @@
 use super::batch::{Batch, Order, Record};
 use super::encode::{AxisEncoder, Precision, RunEncoder};
 use super::schema::{
-    AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, LINEAR_AXIS, PATH, PATH_TOPIC, POSE_IN_FRAME, ROTARY_AXIS, SchemaText,
-    TOOL_TOPICS,
+    AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, LINEAR_AXIS, PATH, PATH_TOPIC, POSE_IN_FRAME, PROGRAMMED, PROGRAMMED_TOPIC,
+    ROTARY_AXIS, SchemaText, TOOL_TOPICS,
 };
 use super::setup::{
     Compression, INPUTS_METADATA, MACHINE_MEDIA_TYPE, PROGRAM_MEDIA_TYPE, RecordingSetup, SUMMARY_METADATA,
@@ -73,6 +73,7 @@ pub(super) struct RecordingWriter {
     axis_channels: PerAxis<Option<Channel>>,
     path: Channel,
     event: Channel,
+    programmed: Option<Channel>,
     poses: [Option<Channel>; TOOL_TOPICS.len()],
     run_encoder: RunEncoder,
     /// Data of the message at work.
@@ -118,6 +119,7 @@ impl RecordingWriter {
             axis_channels: channels.axes,
             path: channels.path,
             event: channels.event,
+            programmed: channels.programmed,
             poses: channels.poses,
             run_encoder,
             buffer: Vec::new(),
@@ -178,6 +180,7 @@ impl RecordingWriter {
             Record::Axis { axis, .. } => self.axis_channels[*axis].as_mut(),
             Record::Path { .. } => Some(&mut self.path),
             Record::Event { .. } => Some(&mut self.event),
+            Record::Programmed { .. } => self.programmed.as_mut(),
             Record::Pose { which, .. } => self.poses[which.index()].as_mut(),
             Record::Program { program, .. } => {
                 self.run_encoder.add_program(program.id, &program.name);
@@ -287,6 +290,7 @@ struct Channels {
     axes: PerAxis<Option<Channel>>,
     path: Channel,
     event: Channel,
+    programmed: Option<Channel>,
     poses: [Option<Channel>; TOOL_TOPICS.len()],
 }
 
@@ -311,7 +315,11 @@ fn add_channels(mcap: &mut mcap::Writer<NoSeek<Target>>, setup: &RecordingSetup)
     for (index, topic) in TOOL_TOPICS.into_iter().enumerate().filter(|(index, _)| signals.pose(*index)) {
         poses[index] = Some(add_channel(mcap, topic, POSE_IN_FRAME, &nothing)?);
     }
-    Ok(Channels { axes, path, event, poses })
+    let programmed = match setup.programmed {
+        true => Some(add_channel(mcap, PROGRAMMED_TOPIC, PROGRAMMED, &nothing)?),
+        false => None,
+    };
+    Ok(Channels { axes, path, event, programmed, poses })
 }
 
 fn add_channel(

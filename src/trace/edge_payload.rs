@@ -23,6 +23,8 @@ pub(super) enum Element {
     Row(Vec<f64>),
     /// HFBlockEvent.
     Block(Value),
+    /// LFData.
+    Low(Value),
     /// Anything else, by its key.
     Other(String),
 }
@@ -158,6 +160,7 @@ impl<R: BufRead> Payload<R> {
                         Ok(None)
                     }
                     "HFBlockEvent" => Ok(Some(Element::Block(self.value()?))),
+                    "LFData" => Ok(Some(Element::Low(self.value()?))),
                     "HFTimestamp" => Ok(Some(Element::Other(self.stamp()?))),
                     _ => {
                         self.skip()?;

@@ -109,6 +109,9 @@ pub fn export_trace(
     let source = Source::open(input, options.progress)?;
     let format = source.format()?;
     let from_recording = format == TraceFormat::Recording;
+    if from_recording {
+        source.refuse_packed()?;
+    }
     let everything = names == ColumnNames::Original && options.only.is_empty();
     if from_recording && form == ExportForm::Recording {
         let message = format!("{} is a recording already", source.shown);

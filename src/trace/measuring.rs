@@ -2,7 +2,8 @@
 //!
 //! In: serialised objects: `<float name="...">` and `<NumericArray format="base85"><raw name="m_pNumberArray">`. Out: one signal an array, two
 //! of a complex one, at `m_dProcessUpdateTime` from value to value; numbers with names as metadata. Frequency responses have no time:
-//! their points are counted, and a note says so. Memory: the arrays.
+//! their points are counted, and a note says so. Memory: all arrays, because they stand one behind the other and become columns: at most
+//! 20 million values (160 MB), an array of at most 64 MB of text.
 
 use super::import::{About, ImportOptions};
 use super::sink::{Head, Layout, Sink};
@@ -21,7 +22,7 @@ const DEPTH_MAX: usize = 200;
 const ARRAYS_MAX: usize = 1000;
 const NUMBERS_MAX: usize = 10_000;
 /// Values of all arrays.
-const VALUES_MAX: usize = 50_000_000;
+const VALUES_MAX: usize = 20_000_000;
 /// Period where the file gives none: the usual current-controller cycle.
 const USUAL_PERIOD_S: f64 = 125e-6;
 
@@ -123,7 +124,7 @@ impl Walk<'_> {
     /// Whether the file ends in good order.
     fn run(&mut self) -> Result<bool, Diagnostic> {
         // The text of an array is one item: megabytes are usual.
-        let mut reader = Reader::from_reader(self.source.read(self.part)?.with_item_limit(256 << 20));
+        let mut reader = Reader::from_reader(self.source.read(self.part)?.with_item_limit(64 << 20));
         reader.config_mut().check_end_names = false;
         reader.config_mut().allow_unmatched_ends = true;
         let mut buffer = Vec::new();
