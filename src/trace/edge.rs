@@ -263,7 +263,7 @@ impl Recorder<'_> {
     }
 
     fn block(&mut self, block: &Value) -> Result<(), Diagnostic> {
-        let counter = block.get("HFProbeCounter").and_then(Value::as_i64);
+        let counter = block.get("HFProbeCounter").or_else(|| block.get("HfProbeCounter")).and_then(Value::as_i64);
         let line = block.get("SeekOffset").and_then(Value::as_u64).and_then(|line| u32::try_from(line).ok());
         let Some(counter) = counter else { return Ok(()) };
         // The last event of a file stands again at the beginning of the next.
