@@ -206,6 +206,7 @@ fn gathered(samples: impl Iterator<Item = (f64, f64, Option<ProgramLine>)>) -> O
         }
     }
     let mut worst: Vec<(ProgramLine, f64)> = worst.into_iter().collect();
+    worst.retain(|(_, error_um)| *error_um > 0.0);
     worst.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     worst.truncate(WORST_MAX);
     Some(Part { figures: gathering.finish()?, worst, course })

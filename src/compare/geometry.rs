@@ -165,7 +165,7 @@ impl Lengths<'_> {
     fn at(&self, time_s: f64, places: &[Option<AxisId>]) -> AxisVector {
         let mut length = AxisVector::zero();
         let block = self.path.and_then(|path| path.block(path.index_at(time_s + TICK_SLACK_S)?));
-        for (value_mm, place) in block.iter().flat_map(|block| block.tool_length).zip(places) {
+        for (value_mm, place) in block.iter().flat_map(|block| block.tool_length_mm).zip(places) {
             if let Some(axis) = place {
                 length[*axis] = *value_mm;
             }

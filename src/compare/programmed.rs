@@ -40,7 +40,7 @@ impl ProgrammedLine {
         let mut line = Self { points_mm: Vec::new(), first_points: vec![0], motions: Vec::new() };
         for i in 0..path.len() {
             let Some(block) = path.block(i) else { break };
-            let length = vector(block.tool_length, &places);
+            let length = vector(block.tool_length_mm, &places);
             // The axes stand the length of the tool away from where its tip is meant to be.
             let postures = block.values.chunks_exact(places.len().max(1));
             let postures = postures.map(|values| MachinePoint(vector(values, &places) + length));

@@ -9,7 +9,7 @@
 use super::faults::TIME_MAX_S;
 use super::import::{About, ImportOptions};
 use super::sink::{Head, Layout, Sink};
-use super::source::{Source, unreadable};
+use super::source::Source;
 use super::wire::{Meaning, Origin, TraceFormat};
 use crate::base::Diagnostic;
 use quick_xml::Reader;
@@ -216,7 +216,7 @@ impl<'a> Walk<'a> {
                 Ok(Event::Eof) => return Ok(self.path.is_empty()),
                 Ok(_) => {}
                 Err(quick_xml::Error::Io(error)) => {
-                    return Err(self.at(unreadable(self.source.part_name(self.part), &error), at));
+                    return Err(self.source.unreadable_at(self.part, at, &error));
                 }
                 Err(_) if !self.arrays.is_empty() => return Ok(false),
                 Err(error) => {

@@ -67,7 +67,7 @@ pub struct ProgrammedView<'a> {
     /// Points of all axes, `[points][axes]`, mm or rad, tip of the tool.
     pub values: &'a [f64],
     /// Position of the axes minus position of the tip, `[axes]`, mm.
-    pub tool_length: &'a [f64],
+    pub tool_length_mm: &'a [f64],
 }
 
 impl ProgrammedPath {
@@ -141,7 +141,7 @@ impl ProgrammedPath {
             line: row.line,
             motion: row.motion,
             values: self.values.get(row.first_point as usize * width..end)?,
-            tool_length: self.tools.get(usize::from(row.tool)).map_or(&[], |length| &length[..width.min(AXES_MAX)]),
+            tool_length_mm: self.tools.get(usize::from(row.tool)).map_or(&[], |length| &length[..width.min(AXES_MAX)]),
         })
     }
 

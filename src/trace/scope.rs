@@ -9,7 +9,7 @@ use super::faults::Faults;
 use super::import::{About, ImportOptions};
 use super::naming::{NamedHead, Naming};
 use super::sink::{Head, Sink};
-use super::source::{PartReader, Source, unreadable};
+use super::source::{PartReader, Source};
 use super::wire::{Clock, Origin, TraceFormat};
 use crate::base::Diagnostic;
 use crate::base::units::NS_PER_S;
@@ -34,8 +34,8 @@ impl<'a> Lines<'a> {
 
     pub(super) fn advance(&mut self) -> Result<bool, Diagnostic> {
         self.at = self.reader.consumed();
-        let shown = self.source.part_name(self.part);
-        self.reader.line(&mut self.line).map_err(|error| unreadable(shown, &error))
+        let Self { source, part, reader, line, at } = self;
+        reader.line(line).map_err(|error| source.unreadable_at(*part, *at, &error))
     }
 
     pub(super) fn notes(&self, faults: &Faults, naming: &mut Naming) -> Vec<Diagnostic> {

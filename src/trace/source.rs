@@ -186,6 +186,16 @@ impl<'a> Source<'a> {
         super::sniff::format_of(&text, shown)
     }
 
+    /// A part cannot be read on; a line that is too long is shown.
+    pub(super) fn unreadable_at(&self, part: usize, byte: u64, error: &io::Error) -> Diagnostic {
+        let finding = unreadable(self.part_name(part), error);
+        let place = if error.to_string() == TOO_LONG { self.place(part, byte, "here") } else { None };
+        match place {
+            Some(place) => finding.at(place),
+            None => finding,
+        }
+    }
+
     /// The line that holds a byte of the decoded text, with the byte marked. Reads the part again: only for findings.
     pub(super) fn place(&self, part: usize, byte: u64, label: &str) -> Option<Place> {
         let silent = Progress(None);
@@ -197,10 +207,12 @@ impl<'a> Source<'a> {
         let mut number = 0_u32;
         loop {
             let start = reader.consumed();
-            if !reader.line(&mut line).ok()? {
-                return None;
-            }
             number = number.saturating_add(1);
+            match reader.line(&mut line) {
+                Ok(true) => {}
+                Ok(false) => return None,
+                Err(_) => return Some(marked(here.shown.clone(), number, &line, 0, label)),
+            }
             if byte < reader.consumed() {
                 return Some(marked(here.shown.clone(), number, &line, (byte - start) as usize, label));
             }
