@@ -153,7 +153,11 @@ fn layouts(head: &[Vec<String>], naming: &mut Naming) -> Layouts {
     // A channel may be called `Name`; no type is called `Data-Type`.
     let keys = line("Data-Type").or_else(|| line("SampleTime[ms]")).or_else(|| line("Name"));
     let key = keys.and_then(|row| row.first()).cloned().unwrap_or_default();
-    let width = about.iter().map(Vec::len).max().unwrap_or(0);
+    let width = keys.map_or(0, Vec::len);
+    let filled = |row: &Vec<String>| row.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+    // Blanks in names, where blanks separate: nothing tells which name is whose.
+    let names_fit = line("Name").is_some_and(|row| filled(row) <= width);
+    let given = |column: usize| value("Name", column).filter(|_| names_fit);
     let is_key = |column: usize| keys.and_then(|row| row.get(column)).is_some_and(|cell| *cell == key);
     let (mut named, mut places) = (Vec::new(), Vec::new());
     let mut time_columns = Vec::new();
@@ -162,12 +166,15 @@ fn layouts(head: &[Vec<String>], naming: &mut Naming) -> Layouts {
             time_columns.push(column);
             continue;
         }
-        let Some(name) = value("SymbolName", column).or_else(|| value("Name", column)) else { continue };
+        let unnamed = || value(&key, column).map(|_| format!("channel {}", named.len() + 1));
+        let Some(name) = value("SymbolName", column).or_else(|| given(column)).or_else(unnamed) else { continue };
         if named.len() >= CHANNELS_MAX {
             break;
         }
-        let same = |other: &NamedHead| other.head.original == name;
-        let name = if named.iter().any(same) { format!("{name} ({})", named.len() + 1) } else { name };
+        // One symbol may be drawn several times, scaled: then the channels have names of their own.
+        let taken = |name: &String| named.iter().any(|other: &NamedHead| other.head.original == *name);
+        let name = if taken(&name) { given(column).unwrap_or(name) } else { name };
+        let name = if taken(&name) { format!("{name} ({})", named.len() + 1) } else { name };
         // `dV (Voltage)`, `(None)`.
         let unit = value("Unit", column).map(|text| text.split('(').next().unwrap_or("").trim().to_owned());
         let mut entry = named_head(&name, unit.as_deref().filter(|unit| !unit.is_empty()), false, naming);
