@@ -15,6 +15,7 @@ const SCHEMA_FILES: [(&str, &str); 6] = [
     ("sollwert/event.proto", "event.fds"),
     ("sollwert/spindle.proto", "spindle.fds"),
     ("sollwert/sample.proto", "sample.fds"),
+    ("sollwert/programmed.proto", "programmed.fds"),
     ("foxglove/PoseInFrame.proto", "pose_in_frame.fds"),
 ];
 

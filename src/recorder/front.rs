@@ -139,13 +139,11 @@ impl Recorder {
         if let Event::ProgramOpened(program) = event {
             self.attach_program(tick, program);
         }
-        let silent = match event {
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => true,
-            Event::SpindlePosition(positioning) => positioning.text.is_empty(),
-            _ => false,
-        };
-        if !silent {
-            self.event(tick, Some(block), event.into());
+        match event {
+            Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {}
+            Event::SpindlePosition(positioning) if positioning.text.is_empty() => {}
+            _ => self.event(tick, Some(block), event.into()),
         }
     }
 
