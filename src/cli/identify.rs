@@ -1,0 +1,160 @@
+//! `sollwert identify`: the parameters of drives from traces of them.
+//!
+//! In: traces of any known format, the machine. Out: a table or JSON with intervals and refusals, with `-o` the machine file with the values in it.
+//! Does not compute anything.
+
+use super::failure::Failure;
+use super::identify_tables::{document, tables};
+use super::inputs::{MachineChoice, TraceNames, refuse_same_file};
+use super::output::{ProgressLine, print, print_json, show};
+use crate::base::{AxisId, Diagnostic, SourceText};
+use crate::identify::{AxisResult, IdentifyOptions, identify as identify_axes, machine_text};
+use crate::kernel::Warning;
+use crate::machine::{Loaded, Machine, parse};
+use crate::recorder::WholeFile;
+use crate::trace::{Trace, import};
+use clap::Args;
+use serde_json::json;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+#[derive(Args)]
+#[command(after_help = "Examples:
+  sollwert identify trace.xml --axis-name 1=X -m my_machine.toml -o identified.toml
+  sollwert identify slow.mcap fast.mcap -m my_machine.toml --axis X --json
+
+What a trace must hold, and how the values and their 95 % intervals are found, is in docs/identify.md. What the
+traces cannot tell is refused, with what to record instead. Torque constant, transmission and cycles are
+those of the machine file.")]
+pub(super) struct IdentifyArguments {
+    /// Traces: recordings, or what a control exported; several are used together
+    #[arg(required = true, value_name = "TRACE")]
+    traces: Vec<PathBuf>,
+    #[command(flatten)]
+    machine: MachineChoice,
+    /// Axis; may be given several times; default: every axis of the traces that the machine has
+    #[arg(long = "axis", value_name = "AXIS")]
+    axes: Vec<String>,
+    #[command(flatten)]
+    names: TraceNames,
+    /// Least squares only: no fit of the simulated axis
+    #[arg(long)]
+    linear: bool,
+    /// Machine file to write, with the values, their intervals as comments, and everything else as it was
+    #[arg(short, long, value_name = "MACHINE.toml")]
+    output: Option<PathBuf>,
+    /// One JSON document on stdout
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Fields of an axis that are read.
+const SIGNALS: [&str; 15] = [
+    "position_setpoint",
+    "position_measured",
+    "position_actual",
+    "position_reference",
+    "control_deviation",
+    "following_error",
+    "velocity_setpoint",
+    "velocity_command",
+    "velocity_feedforward",
+    "torque_feedforward",
+    "torque_reference",
+    "current",
+    "current_mean",
+    "motor_speed_reference",
+    "motor_speed",
+];
+
+pub(super) fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
+    let inputs = || arguments.traces.iter().map(PathBuf::as_path);
+    if let Some(output) = &arguments.output {
+        refuse_same_file(inputs(), output)?;
+    }
+    let loaded = arguments.machine.load_or_recorded(&arguments.traces)?;
+    let machine = &loaded.machine;
+    let options = IdentifyOptions { axes: axes(&arguments.axes, machine)?, linear_only: arguments.linear };
+    let mut traces = Vec::new();
+    for path in inputs() {
+        traces.push(read(path, arguments, machine)?);
+    }
+    let line = std::cell::RefCell::new(ProgressLine::new());
+    let results = identify_axes(&traces, machine, &options, &mut |axis| {
+        line.borrow_mut().update(|| format!("axis {axis}"));
+    })
+    .map_err(Failure::unreadable)?;
+    drop(line);
+    let notes = notes(&results, machine);
+    show(&notes);
+    if let Some(output) = &arguments.output {
+        write(output, &loaded, &results)?;
+    }
+    if arguments.json {
+        let mut document = document(&results, machine, &arguments.traces);
+        document["warnings"] = notes.iter().map(Warning::from).map(|warning| json!(warning)).collect();
+        if let Some(output) = &arguments.output {
+            document["output"] = json!(output.display().to_string());
+        }
+        print_json(&document)?;
+    } else {
+        print(&tables(&results, machine))?;
+        if let Some(output) = &arguments.output {
+            print(&format!("\nmachine file: {}\n", output.display()))?;
+        }
+    }
+    if results.iter().all(|result| result.estimates.is_empty()) { Err(Failure::told()) } else { Ok(()) }
+}
+
+fn read(path: &Path, arguments: &IdentifyArguments, machine: &Machine) -> Result<Trace, Failure> {
+    let only: Vec<String> = SIGNALS.map(str::to_owned).to_vec();
+    let trace = arguments
+        .names
+        .with_options(Some(machine), &only, |options| import(path, options).map_err(Failure::unreadable))?;
+    show(&trace.notes);
+    Ok(trace)
+}
+
+fn axes(names: &[String], machine: &Machine) -> Result<Vec<AxisId>, Failure> {
+    let find = |name: &String| {
+        machine.axis_by_name(name).ok_or_else(|| {
+            let known: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+            let finding = Diagnostic::error("T0202", format!("the machine has no axis `{name}`"));
+            Failure::unreadable(finding.help(format!("its axes are {}", known.join(", "))))
+        })
+    };
+    names.iter().map(find).collect()
+}
+
+/// What a person should know of all axes.
+fn notes(results: &[AxisResult], machine: &Machine) -> Vec<Diagnostic> {
+    let mut notes: Vec<Diagnostic> = results.iter().flat_map(|result| result.notes.clone()).collect();
+    let guessed = |result: &&AxisResult| {
+        let axis = machine.axis_by_name(&result.axis).map(|id| machine.axis(id));
+        axis.and_then(|axis| axis.drive.as_ref()).is_some_and(|drive| !drive.identified)
+    };
+    let names: Vec<&str> =
+        results.iter().filter(|r| !r.estimates.is_empty()).filter(guessed).map(|r| r.axis.as_str()).collect();
+    if !names.is_empty() {
+        let message = format!(
+            "torque constant, transmission and cycles of {} are taken from a machine file that calls its drive representative",
+            names.join(", ")
+        );
+        notes.push(
+            Diagnostic::warning("T0205", message)
+                .help("inertia and friction are as right as the torque constant: take it from the motor (p0316)"),
+        );
+    }
+    notes
+}
+
+fn write(output: &Path, loaded: &Loaded, results: &[AxisResult]) -> Result<(), Failure> {
+    let text = machine_text(&loaded.text_as_used, &loaded.machine, results).map_err(Failure::unreadable)?;
+    // What is written can be read again, or is not written.
+    if let Err(findings) = parse(&SourceText::new(output.display().to_string(), text.as_str()), &[]) {
+        return Err(Failure::found_wrong(findings));
+    }
+    let (whole, mut target) = WholeFile::create(output).map_err(Failure::unreadable)?;
+    target.write_all(text.as_bytes()).map_err(|error| Failure::unreadable(whole.fault(&error)))?;
+    whole.commit(target).map(|_| ()).map_err(Failure::unreadable)
+}

@@ -1,0 +1,9 @@
+//! The room `identify`: what it finds on traces whose truth is known, how right its intervals are, and what it refuses.
+
+#[path = "../random/mod.rs"]
+mod random;
+#[path = "../test_machine/mod.rs"]
+mod test_machine;
+
+mod made;
+mod trust;
