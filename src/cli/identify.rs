@@ -1,11 +1,12 @@
-//! `sollwert identify`: the parameters of drives from traces of them.
+//! `sollwert identify`: the parameters of drives from traces of them; programs to record; the control calibrated.
 //!
 //! In: traces of any known format, the machine. Out: a table or JSON with intervals and refusals, with `-o` the machine file with the values in it.
-//! Does not compute anything.
+//! Does not compute anything. `--plan` and `--smoothing` are in `identify_control`.
 
 use super::failure::Failure;
+use super::identify_control::{calibration, planning};
 use super::identify_tables::{document, tables};
-use super::inputs::{MachineChoice, TraceNames, refuse_same_file};
+use super::inputs::{MachineChoice, Surroundings, TraceNames, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show};
 use crate::base::{AxisId, Diagnostic, SourceText};
 use crate::identify::{AxisResult, IdentifyOptions, identify as identify_axes, machine_text};
@@ -20,29 +21,42 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
+  sollwert identify --plan -m my_machine.toml -o plan
   sollwert identify trace.xml --axis-name 1=X -m my_machine.toml -o identified.toml
   sollwert identify slow.mcap fast.mcap -m my_machine.toml --axis X --json
+  sollwert identify --smoothing trace.mcap part.mpf -m my_machine.toml -o calibrated.toml
 
 What a trace must hold, and how the values and their 95 % intervals are found, is in docs/identify.md. What the
 traces cannot tell is refused, with what to record instead. Torque constant, transmission and cycles are
 those of the machine file.")]
 pub(super) struct IdentifyArguments {
-    /// Traces: recordings, or what a control exported; several are used together
-    #[arg(required = true, value_name = "TRACE")]
-    traces: Vec<PathBuf>,
+    /// Traces: recordings, or what a control exported; several are used together. With --smoothing: a trace and its program
+    #[arg(required_unless_present = "plan", value_name = "TRACE")]
+    pub(super) traces: Vec<PathBuf>,
+    /// Write NC programs to run while the machine is traced, and say which signals to trace
+    #[arg(long, conflicts_with = "smoothing")]
+    plan: bool,
+    /// Calibrate the control on the set-points of a program: TRACE PROGRAM
+    #[arg(long)]
+    smoothing: bool,
+    /// With --smoothing: another traced program, not used for the fit; may be given several times
+    #[arg(long, num_args = 2, value_names = ["TRACE", "PROGRAM"], requires = "smoothing")]
+    pub(super) validate: Vec<PathBuf>,
     #[command(flatten)]
-    machine: MachineChoice,
+    pub(super) machine: MachineChoice,
     /// Axis; may be given several times; default: every axis of the traces that the machine has
     #[arg(long = "axis", value_name = "AXIS")]
-    axes: Vec<String>,
+    pub(super) axes: Vec<String>,
     #[command(flatten)]
     names: TraceNames,
+    #[command(flatten)]
+    pub(super) surroundings: Surroundings,
     /// Least squares only: no fit of the simulated axis
     #[arg(long)]
     linear: bool,
-    /// Machine file to write, with the values, their intervals as comments, and everything else as it was
+    /// Machine file to write, with the values, their intervals as comments, and everything else as it was; with --plan a folder
     #[arg(short, long, value_name = "MACHINE.toml")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
     /// One JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
@@ -68,6 +82,12 @@ const SIGNALS: [&str; 15] = [
 ];
 
 pub(super) fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
+    if arguments.plan {
+        return planning(arguments);
+    }
+    if arguments.smoothing {
+        return calibration(arguments);
+    }
     let inputs = || arguments.traces.iter().map(PathBuf::as_path);
     if let Some(output) = &arguments.output {
         refuse_same_file(inputs(), output)?;
@@ -77,7 +97,7 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     let options = IdentifyOptions { axes: axes(&arguments.axes, machine)?, linear_only: arguments.linear };
     let mut traces = Vec::new();
     for path in inputs() {
-        traces.push(read(path, arguments, machine)?);
+        traces.push(read(path, &SIGNALS, arguments, machine)?);
     }
     let line = std::cell::RefCell::new(ProgressLine::new());
     let results = identify_axes(&traces, machine, &options, &mut |axis| {
@@ -106,8 +126,14 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     if results.iter().all(|result| result.estimates.is_empty()) { Err(Failure::told()) } else { Ok(()) }
 }
 
-fn read(path: &Path, arguments: &IdentifyArguments, machine: &Machine) -> Result<Trace, Failure> {
-    let only: Vec<String> = SIGNALS.map(str::to_owned).to_vec();
+/// Reads some fields of a trace.
+pub(super) fn read(
+    path: &Path,
+    signals: &[&str],
+    arguments: &IdentifyArguments,
+    machine: &Machine,
+) -> Result<Trace, Failure> {
+    let only: Vec<String> = signals.iter().map(|&signal| signal.to_owned()).collect();
     let trace = arguments
         .names
         .with_options(Some(machine), &only, |options| import(path, options).map_err(Failure::unreadable))?;
@@ -115,7 +141,7 @@ fn read(path: &Path, arguments: &IdentifyArguments, machine: &Machine) -> Result
     Ok(trace)
 }
 
-fn axes(names: &[String], machine: &Machine) -> Result<Vec<AxisId>, Failure> {
+pub(super) fn axes(names: &[String], machine: &Machine) -> Result<Vec<AxisId>, Failure> {
     let find = |name: &String| {
         machine.axis_by_name(name).ok_or_else(|| {
             let known: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
@@ -154,6 +180,11 @@ fn write(output: &Path, loaded: &Loaded, results: &[AxisResult]) -> Result<(), F
     if let Err(findings) = parse(&SourceText::new(output.display().to_string(), text.as_str()), &[]) {
         return Err(Failure::found_wrong(findings));
     }
+    write_whole(output, &text)
+}
+
+/// Writes a text under its name when it is complete.
+pub(super) fn write_whole(output: &Path, text: &str) -> Result<(), Failure> {
     let (whole, mut target) = WholeFile::create(output).map_err(Failure::unreadable)?;
     target.write_all(text.as_bytes()).map_err(|error| Failure::unreadable(whole.fault(&error)))?;
     whole.commit(target).map(|_| ()).map_err(Failure::unreadable)

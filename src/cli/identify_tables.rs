@@ -103,8 +103,11 @@ pub(super) fn document(results: &[AxisResult], machine: &Machine, traces: &[Path
             let (value, low, high) = (estimate.value, estimate.low, estimate.high);
             json!({"value": value, "unit": unit, "low": low, "high": high, "method": estimate.means.title()})
         };
-        let of_axis: Map<String, Value> =
-            result.estimates.iter().map(|estimate| (estimate.parameter.key(axis).to_owned(), entry(estimate))).collect();
+        let of_axis: Map<String, Value> = result
+            .estimates
+            .iter()
+            .map(|estimate| (estimate.parameter.key(axis).to_owned(), entry(estimate)))
+            .collect();
         document[&result.axis] = Value::Object(of_axis);
         let of_axis = result.refusals.iter().map(|refusal| {
             let value = json!({"reason": refusal.reason, "remedy": refusal.remedy});

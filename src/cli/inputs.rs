@@ -4,9 +4,9 @@
 
 use super::failure::Failure;
 use super::output::{ProgressLine, show};
-use crate::base::{Diagnostic, SourceText};
 use crate::base::diagnostics::nearest;
 use crate::base::units::percent_from_ratio;
+use crate::base::{Diagnostic, SourceText};
 use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
 use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, parse, unsupported};

@@ -14,6 +14,7 @@ mod export;
 mod failure;
 mod follow;
 mod identify;
+mod identify_control;
 mod identify_tables;
 mod inputs;
 mod machine;

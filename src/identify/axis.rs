@@ -33,8 +33,7 @@ pub fn identify(
     options: &IdentifyOptions,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Vec<AxisResult>, Diagnostic> {
-    let asked: Vec<AxisId> =
-        if options.axes.is_empty() { machine.axis_ids().collect() } else { options.axes.clone() };
+    let asked: Vec<AxisId> = if options.axes.is_empty() { machine.axis_ids().collect() } else { options.axes.clone() };
     let mut results = Vec::new();
     for id in asked {
         let axis = machine.axis(id);
@@ -94,7 +93,11 @@ fn one_axis(
     }
     if records.is_empty() {
         for parameter in Parameter::ALL {
-            result.refuse(parameter, "no trace has a signal of this axis", "record this axis, or name it with --axis-name 7=X");
+            result.refuse(
+                parameter,
+                "no trace has a signal of this axis",
+                "record this axis, or name it with --axis-name 7=X",
+            );
         }
         return Ok(result);
     }
@@ -164,15 +167,23 @@ fn mechanics(
     // Samples and means are not mixed: the best source of all traces counts.
     let of_best: Vec<AxisRecord> = usable
         .into_iter()
-        .filter(|record| record.torque.as_ref().map(|torque| torque.source.is_folded()) == best.map(TorqueSource::is_folded))
+        .filter(|record| {
+            record.torque.as_ref().map(|torque| torque.source.is_folded()) == best.map(TorqueSource::is_folded)
+        })
         .cloned()
         .collect();
     let motions: Vec<Motion> = of_best.iter().filter_map(|record| Motion::of(record, r)).collect();
     let (Some(source), false) = (best, motions.is_empty()) else {
         let (reason, remedy) = if best.is_none() {
-            ("no trace has a current or a torque", "record the current (Operate: ActCurr; Edge: CURRENT), best as its mean over the position cycle")
+            (
+                "no trace has a current or a torque",
+                "record the current (Operate: ActCurr; Edge: CURRENT), best as its mean over the position cycle",
+            )
         } else {
-            ("no trace has position and torque together", "record the position in the same trace (Operate: ActPos2ndEnc; Edge: ENC_POS)")
+            (
+                "no trace has position and torque together",
+                "record the position in the same trace (Operate: ActPos2ndEnc; Edge: ENC_POS)",
+            )
         };
         for parameter in &Parameter::ALL[..6] {
             result.refuse(*parameter, reason, remedy);
@@ -217,9 +228,10 @@ fn unfold(
     source: TorqueSource,
     result: &mut AxisResult,
 ) {
-    const REMEDY: &str =
-        "record the mean of the current over the position cycle (our recordings: current_mean), or trace the drive at its current cycle";
-    let Some(place) = found.estimates.iter().position(|estimate| estimate.parameter == Parameter::Inertia) else { return };
+    const REMEDY: &str = "record the mean of the current over the position cycle (our recordings: current_mean), or trace the drive at its current cycle";
+    let Some(place) = found.estimates.iter().position(|estimate| estimate.parameter == Parameter::Inertia) else {
+        return;
+    };
     let by_set = records.iter().all(|record| record.setpoint_lu.is_some());
     let cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
     let at_cycle = records.iter().all(|record| (record.period_s / cycle_s - 1.0).abs() < 1e-3);
@@ -239,7 +251,11 @@ fn unfold(
     let percent = percent_from_ratio(off);
     if off.abs() > FOLDING_SHARE {
         found.estimates.remove(place);
-        result.refuse(Parameter::Inertia, format!("sampling the current once a cycle makes the inertia wrong by {percent:.0} %"), REMEDY);
+        result.refuse(
+            Parameter::Inertia,
+            format!("sampling the current once a cycle makes the inertia wrong by {percent:.0} %"),
+            REMEDY,
+        );
         return;
     }
     let share = if data.identified { FOLDING_KNOWN_SHARE.0 } else { FOLDING_KNOWN_SHARE.1 };

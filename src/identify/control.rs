@@ -83,8 +83,7 @@ enum Knob {
 
 /// Knobs of the path, and of the time.
 const SHAPE: [Knob; 3] = [Knob::Alpha, Knob::Ratio, Knob::RatioReversal];
-const TIME: [Knob; 5] =
-    [Knob::RadialAcceleration, Knob::RadialJerk, Knob::TransitionJerk, Knob::Jerk, Knob::FollowUp];
+const TIME: [Knob; 5] = [Knob::RadialAcceleration, Knob::RadialJerk, Knob::TransitionJerk, Knob::Jerk, Knob::FollowUp];
 /// Relative step of the differences.
 const STEP_SHARE: f64 = 0.03;
 /// Passes of a fit while choices are compared, and in the end.
@@ -220,7 +219,10 @@ impl Fit<'_> {
     }
 
     fn value(&self, knob: Knob) -> f64 {
-        self.values.iter().find(|(known, _)| *known == knob).map_or_else(|| knob.get(&self.machine), |(_, value)| *value)
+        self.values
+            .iter()
+            .find(|(known, _)| *known == knob)
+            .map_or_else(|| knob.get(&self.machine), |(_, value)| *value)
     }
 
     fn with(&self, moved: &[(Knob, f64)]) -> Vec<(Knob, f64)> {
@@ -314,8 +316,14 @@ pub fn calibrate(
         sets: Vec::new(),
         plans: 0,
     };
-    let mut fit =
-        Fit { machine: machine.clone(), target: &target, setup: &fitted.setup, axes: &axes, values: Vec::new(), plans: 0 };
+    let mut fit = Fit {
+        machine: machine.clone(),
+        target: &target,
+        setup: &fitted.setup,
+        axes: &axes,
+        values: Vec::new(),
+        plans: 0,
+    };
     let before = fit.profile(&[]).ok_or_else(|| refused("the program ends in an alarm on this machine"))?;
     if (before.length_mm / target.length_mm - 1.0).abs() > LENGTH_SHARE {
         return Err(refused(&format!(
@@ -346,7 +354,9 @@ pub fn calibrate(
         let target = self::target(pair, machine, &axes)?;
         let one = |machine: &Arc<Machine>| {
             let planned = PathProfile::planned(machine, &pair.setup, &axes);
-            planned.map(|planned| agreement(&planned, &target)).ok_or_else(|| refused("a program ends in an alarm on this machine"))
+            planned
+                .map(|planned| agreement(&planned, &target))
+                .ok_or_else(|| refused("a program ends in an alarm on this machine"))
         };
         result.agreements.push((one(&old)?, one(&after)?));
     }
@@ -360,7 +370,11 @@ fn refused(reason: &str) -> Diagnostic {
 
 fn target(pair: &TracedProgram<'_>, machine: &Machine, axes: &[AxisId]) -> Result<PathProfile, Diagnostic> {
     if axes.len() < 2 {
-        return Err(refused(&format!("`{}` has position set-points of {} linear axes of this machine", pair.trace.name, axes.len())));
+        return Err(refused(&format!(
+            "`{}` has position set-points of {} linear axes of this machine",
+            pair.trace.name,
+            axes.len()
+        )));
     }
     PathProfile::of_trace(pair.trace, machine, axes)
         .ok_or_else(|| refused(&format!("the set-points of `{}` do not move, or have gaps", pair.trace.name)))
@@ -390,7 +404,8 @@ fn best_choice(
             let mut tried = machine.clone();
             (tried.feed.time_law, tried.smoothing.blend_law) = (time_law, blend_law);
             let values = fit.values.clone();
-            let mut one = Fit { machine: tried, values, target: fit.target, setup: fit.setup, axes: fit.axes, plans: fit.plans };
+            let mut one =
+                Fit { machine: tried, values, target: fit.target, setup: fit.setup, axes: fit.axes, plans: fit.plans };
             let done = one.run(&TIME, false, PASSES.0);
             fit.plans = one.plans;
             if let Some((cost, ..)) = done
@@ -403,7 +418,11 @@ fn best_choice(
     let (_, chosen, values) = best.ok_or_else(|| refused("no time law drives this program without an alarm"))?;
     let words = vec![
         ("feed.time_law", chosen.feed.time_law.word().to_owned(), machine.feed.time_law.word().to_owned()),
-        ("smoothing.blend_law", chosen.smoothing.blend_law.word().to_owned(), machine.smoothing.blend_law.word().to_owned()),
+        (
+            "smoothing.blend_law",
+            chosen.smoothing.blend_law.word().to_owned(),
+            machine.smoothing.blend_law.word().to_owned(),
+        ),
     ];
     (fit.machine, fit.values) = (chosen, values);
     Ok(words)
@@ -420,7 +439,8 @@ fn take(
     let (_, solution, active) = done.unwrap_or((0.0, None, Vec::new()));
     for knob in knobs {
         let place = active.iter().position(|known| known == knob);
-        let what = if shape { "no corner of this program shows it" } else { "nothing in this program is held back by it" };
+        let what =
+            if shape { "no corner of this program shows it" } else { "nothing in this program is held back by it" };
         let (Some(place), Some(solution)) = (place, &solution) else {
             result.refusals.push((knob.key(), what.to_owned()));
             continue;
@@ -430,7 +450,9 @@ fn take(
         let half = solution.value(place).1 + solution.theta[place].abs() + 2e-3 * value.abs();
         if half > WIDE_SHARE * value.abs() {
             let percent = percent_from_ratio(half / value.abs());
-            result.refusals.push((knob.key(), format!("this program tells it to ±{percent:.0} % only; {value:.3} was used")));
+            result
+                .refusals
+                .push((knob.key(), format!("this program tells it to ±{percent:.0} % only; {value:.3} was used")));
         } else {
             let (low, high) = (value - half, value + half);
             result.estimates.push(ControlEstimate { key: knob.key(), title: knob.title(), value, low, high });
@@ -467,7 +489,10 @@ fn axis_sets(knob: Knob, axis: &Axis) -> Vec<String> {
         let border = |jerk: f64| if linear { jerk / MM_PER_M } else { jerk / RAD_PER_REV };
         let (jerk, transition) = (border(limits.jerk_max_lu_s3), border(limits.transition_jerk_max_lu_s3));
         // Both: a transition jerk that is not given follows the other.
-        [format!("axes.{name}.{table}jerk_max_{unit}={jerk:.6}"), format!("axes.{name}.{table}transition_jerk_max_{unit}={transition:.6}")]
+        [
+            format!("axes.{name}.{table}jerk_max_{unit}={jerk:.6}"),
+            format!("axes.{name}.{table}transition_jerk_max_{unit}={transition:.6}"),
+        ]
     };
     let mut sets = both("", &axis.limits).to_vec();
     for mode in DynamicsMode::ALL {

@@ -35,36 +35,40 @@ struct Lagged {
     left_over_share: f64,
 }
 
-/// Fits `response[k]` to the rows that `regressors(k, n)` gives, for every lag n.
-fn best_lag(
+/// Lags behind the best one that are still tried: a motion that repeats would find itself again a whole period later.
+const LAGS_BEYOND: usize = 8;
+
+/// Fits `response(k, n)` to the rows that `regressors(k, n)` gives, for one lag n after another.
+fn best_lag<const WIDTH: usize>(
     records: &[AxisRecord],
-    width: usize,
     response: impl Fn(&AxisRecord, usize, usize) -> f64,
-    regressors: impl Fn(&AxisRecord, usize, usize) -> Vec<f64>,
+    regressors: impl Fn(&AxisRecord, usize, usize) -> [f64; WIDTH],
 ) -> Option<Lagged> {
     let lags = records.first().map_or(1, |record| ((LAG_MAX_S / record.period_s) as usize).clamp(2, LAGS_MAX));
+    let columns: [usize; WIDTH] = std::array::from_fn(|column| column);
+    let mut square = 0.0;
     let mut best: Option<(f64, Lagged)> = None;
     for n in 0..=lags {
-        let mut blocks = Blocks::new(width);
-        let mut square = 0.0;
+        let mut blocks = Blocks::new(WIDTH);
         for record in records {
             let per_block = ((BLOCK_S / record.period_s).round() as usize).max(1);
+            // All lags begin where the longest does, so that what they leave over can be compared.
             for k in (lags + 3)..record.count {
                 let (row, y) = (regressors(record, k, n), response(record, k, n));
                 if y.is_finite() && row.iter().all(|value| value.is_finite()) {
-                    // Beginning and end of all lags are those of the longest, so that their sums can be held against each other.
                     blocks.push_in(k / per_block, &row, y);
-                    square += response(record, k, 0).powi(2);
+                    square += if n == 0 { y * y } else { 0.0 };
                 }
             }
             blocks.close();
         }
-        let columns: Vec<usize> = (0..width).collect();
         let Some(solution) = blocks.solve(&columns) else { continue };
         let left = blocks.residual_square(&columns, &solution.theta);
         if best.as_ref().is_none_or(|(least, _)| left < *least) {
             let left_over_share = if square > 0.0 { (left / square).sqrt() } else { 0.0 };
             best = Some((left, Lagged { n, solution, left_over_share }));
+        } else if best.as_ref().is_some_and(|(_, lagged)| n > lagged.n + LAGS_BEYOND) {
+            break;
         }
     }
     best.map(|(_, lagged)| lagged)
@@ -79,9 +83,8 @@ fn raw_velocity(record: &AxisRecord, k: usize) -> f64 {
 }
 
 fn raw_acceleration(record: &AxisRecord, k: usize) -> f64 {
-    k.checked_sub(1).map_or(f64::NAN, |before| {
-        (raw_velocity(record, k) - raw_velocity(record, before)) / record.period_s
-    })
+    k.checked_sub(1)
+        .map_or(f64::NAN, |before| (raw_velocity(record, k) - raw_velocity(record, before)) / record.period_s)
 }
 
 fn at(values: &Option<Vec<f64>>, k: usize) -> f64 {
@@ -173,7 +176,8 @@ fn moves(records: &[AxisRecord]) -> bool {
 }
 
 fn velocity_feedforward(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mut AxisResult) {
-    const RECORD: &str = "record the velocity feed-forward (Edge: VEL_FFW), or the output of the position controller with its deviation";
+    const RECORD: &str =
+        "record the velocity feed-forward (Edge: VEL_FFW), or the output of the position controller with its deviation";
     if !have(records, |record| &record.velocity_feedforward_lu_s) {
         return; // `position_gain` may find it together with Kv.
     }
@@ -185,7 +189,8 @@ fn velocity_feedforward(records: &[AxisRecord], found: &mut Vec<Estimate>, resul
     }
     let response = |record: &AxisRecord, k: usize, _| at(&record.velocity_feedforward_lu_s, k);
     let regressors = |record: &AxisRecord, k: usize, n: usize| two_lags(record, k, n, raw_velocity);
-    let Some(lagged) = best_lag(records, 2, response, regressors).filter(|lagged| fits(lagged, "velocity feed-forward", result))
+    let Some(lagged) =
+        best_lag(records, response, regressors).filter(|lagged| fits(lagged, "velocity feed-forward", result))
     else {
         for parameter in [Parameter::VelocityFeedforward, Parameter::FeedforwardDelay] {
             result.refuse(parameter, "the velocity feed-forward is not a delayed speed of the set-point: a filter of the set-point stands in front", RECORD);
@@ -196,8 +201,8 @@ fn velocity_feedforward(records: &[AxisRecord], found: &mut Vec<Estimate>, resul
 }
 
 /// The two lags of a signal of the set-point.
-fn two_lags(record: &AxisRecord, k: usize, n: usize, signal: fn(&AxisRecord, usize) -> f64) -> Vec<f64> {
-    [k - n, k - n - 1].map(|k| signal(record, k)).to_vec()
+fn two_lags(record: &AxisRecord, k: usize, n: usize, signal: fn(&AxisRecord, usize) -> f64) -> [f64; 2] {
+    [k - n, k - n - 1].map(|k| signal(record, k))
 }
 
 /// Whether the law is exact but for rounding and noise.
@@ -236,7 +241,7 @@ fn torque_feedforward(records: &[AxisRecord], data: &DriveData, found: &mut Vec<
     let response = |record: &AxisRecord, k: usize, _| at(&record.torque_feedforward_n_m, k);
     let regressors = |record: &AxisRecord, k: usize, n: usize| two_lags(record, k, n, raw_acceleration);
     let inertia = data.feedforward_inertia_kg_m2;
-    match best_lag(records, 2, response, regressors).filter(|lagged| fits(lagged, "torque feed-forward", result)) {
+    match best_lag(records, response, regressors).filter(|lagged| fits(lagged, "torque feed-forward", result)) {
         Some(lagged) if inertia > 0.0 => {
             let scale = data.mechanics.transmission_lu_per_rad / inertia;
             gain_and_delay(&lagged, records[0].period_s, Parameter::TorqueFeedforward, scale, found);
@@ -267,13 +272,15 @@ fn setpoint_delay(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mu
         return;
     }
     let setpoint = |record: &AxisRecord, k: usize| at(&record.setpoint_lu, k);
-    let response =
-        |record: &AxisRecord, k: usize, n: usize| at(&record.reference_lu, k) - setpoint(record, k - n);
-    let regressors = |record: &AxisRecord, k: usize, n: usize| {
-        vec![setpoint(record, k - n) - setpoint(record, k - n - 1), 1.0]
-    };
-    let Some(lagged) = best_lag(records, 2, response, regressors) else {
-        result.refuse(Parameter::SetpointDelay, "the set-point does not move enough", "record a program that moves this axis");
+    let response = |record: &AxisRecord, k: usize, n: usize| at(&record.reference_lu, k) - setpoint(record, k - n);
+    let regressors =
+        |record: &AxisRecord, k: usize, n: usize| [setpoint(record, k - n) - setpoint(record, k - n - 1), 1.0];
+    let Some(lagged) = best_lag(records, response, regressors) else {
+        result.refuse(
+            Parameter::SetpointDelay,
+            "the set-point does not move enough",
+            "record a program that moves this axis",
+        );
         return;
     };
     let step = rms_step(records);
@@ -293,7 +300,8 @@ fn setpoint_delay(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mu
 
 /// RMS of the way of the set-point in a cycle.
 fn rms_step(records: &[AxisRecord]) -> f64 {
-    let steps = records.iter().flat_map(|record| (1..record.count).map(move |k| raw_velocity(record, k) * record.period_s));
+    let steps =
+        records.iter().flat_map(|record| (1..record.count).map(move |k| raw_velocity(record, k) * record.period_s));
     let (mut square, mut count) = (0.0, 0.0);
     for step in steps.filter(|step| step.is_finite() && *step != 0.0) {
         square += step * step;
@@ -335,7 +343,8 @@ fn position_gain(records: &[AxisRecord], data: &DriveData, found: &mut Vec<Estim
         for record in records {
             let per_block = ((BLOCK_S / record.period_s).round() as usize).max(1);
             for k in 0..record.count {
-                let (e, y) = (at(&record.deviation_lu, k), command(record, k) - at(&record.velocity_feedforward_lu_s, k));
+                let (e, y) =
+                    (at(&record.deviation_lu, k), command(record, k) - at(&record.velocity_feedforward_lu_s, k));
                 if e.is_finite() && y.is_finite() {
                     blocks.push_in(k / per_block, &[e], y);
                 }
@@ -348,9 +357,9 @@ fn position_gain(records: &[AxisRecord], data: &DriveData, found: &mut Vec<Estim
     let response = |record: &AxisRecord, k: usize, _| command(record, k);
     let regressors = |record: &AxisRecord, k: usize, n: usize| {
         let [newer, older] = [k - n, k - n - 1].map(|k| raw_velocity(record, k));
-        vec![newer, older, at(&record.deviation_lu, k)]
+        [newer, older, at(&record.deviation_lu, k)]
     };
-    let lagged = best_lag(records, 3, response, regressors);
+    let lagged = best_lag(records, response, regressors);
     if let Some(lagged) = &lagged {
         gain_and_delay(lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found);
         let mut solution = lagged.solution.clone();
@@ -386,7 +395,8 @@ fn lags(records: &[AxisRecord], axis: &Axis, result: &mut AxisResult) {
         if let Some((gain, delay_s, share)) = taps(records, response) {
             result.figures.push(Figure {
                 key: "setpoint_filter_delay_ms",
-                title: "delay of the set-point speed at the controller's input behind the set-point (a filter)".to_owned(),
+                title: "delay of the set-point speed at the controller's input behind the set-point (a filter)"
+                    .to_owned(),
                 value: delay_s * MS_PER_S,
                 unit: "ms",
             });

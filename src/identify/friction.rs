@@ -27,24 +27,25 @@ const GS: usize = 4;
 const GC: usize = 5;
 const SHIFT: usize = 6;
 const SPRING: usize = 7;
-const STRIBECK: [usize; 2] = [8, 9];
-const SQUARE: usize = 10;
-const ONE_SIDED: usize = 11;
-const WIDTH: usize = 12;
+const STRIBECK: [usize; 3] = [8, 9, 10];
+const SQUARE: usize = 11;
+const ONE_SIDED: usize = 12;
+const WIDTH: usize = 13;
 
 /// Terms that the law does not have, and what one that is there means.
-const ALTERNATIVES: [(usize, &str); 6] = [
+const ALTERNATIVES: [(usize, &str); 7] = [
     (STRIBECK[0], "friction is higher at low speed (Stribeck)"),
     (STRIBECK[1], "friction is higher at low speed (Stribeck)"),
+    (STRIBECK[2], "friction is higher at low speed (Stribeck)"),
     (SQUARE, "friction bends with speed"),
     (ONE_SIDED, "friction grows differently in the two directions"),
     (SHIFT, "torque and position are not sampled at the same instant"),
     (SPRING, "motor and scale do not move as one body (elastic drive train)"),
 ];
 /// Speeds of the Stribeck terms, as shares of the highest.
-const STRIBECK_SHARES: [f64; 2] = [0.04, 0.12];
+const STRIBECK_SHARES: [f64; 3] = [0.02, 0.05, 0.15];
 /// Standard errors from which an alternative counts.
-const SIGNIFICANT: f64 = 4.0;
+const SIGNIFICANT: f64 = 2.6;
 /// How much of the shift by an alternative an interval takes in.
 const SHIFT_TAKEN: f64 = 1.5;
 /// What differences at the position cycle do to the values at most, found on traces without noise.
@@ -89,12 +90,7 @@ fn covered(motions: &[Motion]) -> Covered {
     let speed_max_rad_s = motions.iter().map(|motion| motion.speed_max_rad_s).fold(0.0, f64::max);
     let seconds = |motion: &Motion| motion.moves.iter().filter(|moves| **moves).count() as f64 * motion.period_s;
     let block_s = (motions.iter().map(seconds).sum::<f64>() / BLOCKS).clamp(BLOCK_S.0, BLOCK_S.1);
-    let mut all = Covered {
-        blocks: Blocks::new(WIDTH),
-        torque_max_n_m: 0.0,
-        direction_s: [0.0; 2],
-        range_lu: 0.0,
-    };
+    let mut all = Covered { blocks: Blocks::new(WIDTH), torque_max_n_m: 0.0, direction_s: [0.0; 2], range_lu: 0.0 };
     let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
     for motion in motions {
         let per_block = ((block_s / motion.period_s).round() as usize).max(1);
@@ -131,6 +127,7 @@ fn row(motion: &Motion, k: usize, speed_max_rad_s: f64) -> [f64; WIDTH] {
         motion.snap_rad_s4(k),
         stribeck(STRIBECK_SHARES[0]),
         stribeck(STRIBECK_SHARES[1]),
+        stribeck(STRIBECK_SHARES[2]),
         w * w.abs(),
         w.abs(),
     ]
@@ -148,12 +145,13 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, folded: bool, result: &m
     };
     (found.condition, found.rms_n_m) = (solution.condition, solution.rms);
     let shifts = misfits(&all.blocks, &columns, &solution, &mut result.verdicts);
-    let moved = |place: usize| matches!(columns[place], J | B | TC) && shifts[place] > 0.02 * solution.theta[place].abs();
+    let moved =
+        |place: usize| matches!(columns[place], J | B | TC) && shifts[place] > 0.02 * solution.theta[place].abs();
     found.misfit = (0..columns.len()).any(moved);
     for (place, column) in columns.iter().enumerate() {
         let Some(parameter) = parameter_of(*column, both) else { continue };
         let (value, noise) = solution.value(place);
-        let half = noise + SHIFT_TAKEN * shifts[place] + METHOD_SHARE * value.abs();
+        let half = noise.hypot(METHOD_SHARE * value) + SHIFT_TAKEN * shifts[place];
         let estimate = Estimate::around(parameter, value, half, Means::OneShot);
         match verdict(&estimate, &all, solution.stretches[place], found.value(Parameter::Coulomb)) {
             None => found.estimates.push(estimate),
@@ -165,7 +163,8 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, folded: bool, result: &m
     found
 }
 
-const PLAN: &str = "record the programs of `sollwert identify --plan`: constant speeds in both directions, and jerk-limited moves";
+const PLAN: &str =
+    "record the programs of `sollwert identify --plan`: constant speeds in both directions, and jerk-limited moves";
 
 fn refuse_all(result: &mut AxisResult, reason: &str, remedy: &str) {
     for parameter in [Parameter::Inertia, Parameter::Viscous, Parameter::Coulomb, Parameter::Gravity] {
@@ -275,18 +274,23 @@ fn verdict(estimate: &Estimate, all: &Covered, stretches: f64, coulomb: Option<f
     let wide = |limit: f64| half > limit * value.abs();
     match estimate.parameter {
         Parameter::Inertia if value <= 0.0 => Some((
-            format!("the torque falls where the axis accelerates (J = {value:.3e}): the sign of torque or transmission is wrong"),
+            format!(
+                "the torque falls where the axis accelerates (J = {value:.3e}): the sign of torque or transmission is wrong"
+            ),
             "check pitch_mm or gear_ratio with its sign, and which signal is the torque".to_owned(),
         )),
         Parameter::Inertia if wide(0.3) => Some((
-            format!("the trace hardly accelerates the axis, or does not follow the law: ±{:.0} %", percent(half / value.abs())),
+            format!(
+                "the trace hardly accelerates the axis, or does not follow the law: ±{:.0} %",
+                percent(half / value.abs())
+            ),
             "record jerk-limited moves at the highest acceleration (`sollwert identify --plan`)".to_owned(),
         )),
         Parameter::Viscous if value < -half => Some((
             "friction falls with speed: a viscous law does not hold here".to_owned(),
             "record more constant speeds, up to the highest (`sollwert identify --plan`)".to_owned(),
         )),
-        Parameter::Viscous if wide(0.7) => Some((
+        Parameter::Viscous if wide(0.5) => Some((
             format!(
                 "the speeds are too much alike to tell it from constant friction: between {:.2e} and {:.2e}",
                 estimate.low, estimate.high
@@ -335,7 +339,9 @@ fn figures(all: &Covered, columns: &[usize], solution: &Solution, both: bool, re
     let rms = solution.rms;
     push("torque_residual_rms_n_m", "torque that the law leaves over, RMS after the filter", rms);
     if rms > 0.25 * all.torque_max_n_m {
-        result.verdicts.push("a quarter of the torque and more is not explained by the law: something else moves this axis".to_owned());
+        result.verdicts.push(
+            "a quarter of the torque and more is not explained by the law: something else moves this axis".to_owned(),
+        );
     }
 }
 

@@ -103,11 +103,8 @@ const CIRCLE_SHARE: f64 = 0.25;
 
 /// Programs for the given axes (all with a drive if none is given).
 pub fn plan(machine: &Machine, axes: &[crate::base::AxisId]) -> Vec<PlannedProgram> {
-    let chosen: Vec<&Axis> = machine
-        .axis_ids()
-        .filter(|id| axes.is_empty() || axes.contains(id))
-        .map(|id| machine.axis(id))
-        .collect();
+    let chosen: Vec<&Axis> =
+        machine.axis_ids().filter(|id| axes.is_empty() || axes.contains(id)).map(|id| machine.axis(id)).collect();
     let mut programs: Vec<PlannedProgram> = chosen.iter().map(|axis| of_axis(machine, axis)).collect();
     let linear: Vec<&Axis> = chosen.iter().copied().filter(|axis| axis.kind == AxisKind::Linear).collect();
     let plane = |one: &str, other: &str| {
@@ -150,7 +147,11 @@ impl Reach {
     /// Time of a jerk-limited ramp from rest to `speed`.
     fn ramp_s(&self, speed: f64) -> f64 {
         let full = self.acceleration * self.acceleration / self.jerk;
-        if speed <= full { 2.0 * (speed / self.jerk).sqrt() } else { speed / self.acceleration + self.acceleration / self.jerk }
+        if speed <= full {
+            2.0 * (speed / self.jerk).sqrt()
+        } else {
+            speed / self.acceleration + self.acceleration / self.jerk
+        }
     }
 
     /// Way with both ramps and the constant speed that is wanted.

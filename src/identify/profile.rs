@@ -60,7 +60,8 @@ impl PathProfile {
             signal.resampled(&times, method)
         };
         let columns: Vec<Vec<f64>> = signals.iter().map(column).collect();
-        let places: Vec<Vec<f64>> = (0..times.len()).map(|k| columns.iter().map(|column| column[k]).collect()).collect();
+        let places: Vec<Vec<f64>> =
+            (0..times.len()).map(|k| columns.iter().map(|column| column[k]).collect()).collect();
         let complete = places.iter().flatten().all(|value| value.is_finite());
         complete.then(|| Self::of(&places, period_s, 0.0)).flatten()
     }

@@ -110,7 +110,12 @@ fn grid<'t>(trace: &'t Trace, axis: &Axis) -> Option<&'t TimeGrid> {
 }
 
 /// Reads one axis; `Ok(None)` if the trace has nothing of it.
-pub(super) fn read(trace: &Trace, axis: &Axis, data: &DriveData, cycle_s: f64) -> Result<Option<AxisRecord>, Diagnostic> {
+pub(super) fn read(
+    trace: &Trace,
+    axis: &Axis,
+    data: &DriveData,
+    cycle_s: f64,
+) -> Result<Option<AxisRecord>, Diagnostic> {
     let Some(grid) = grid(trace, axis) else { return Ok(None) };
     let (Some(start_s), Some(end_s), Some(period_s)) = (grid.start_s(), grid.end_s(), grid.period_s()) else {
         return Ok(None);
@@ -118,8 +123,9 @@ pub(super) fn read(trace: &Trace, axis: &Axis, data: &DriveData, cycle_s: f64) -
     let rows = ((end_s - start_s) / period_s).round() + 1.0;
     if !(2.0..=ROWS_MAX as f64).contains(&rows) {
         let message = format!("`{}`: {rows:.0} samples of axis {} at {period_s:e} s", trace.name, axis.name);
-        return Err(Diagnostic::error("T0203", message)
-            .help("the times of this trace are no grid that an identification can use: export it at one sampling period"));
+        return Err(Diagnostic::error("T0203", message).help(
+            "the times of this trace are no grid that an identification can use: export it at one sampling period",
+        ));
     }
     let times = (0..rows as usize).map(|k| start_s + k as f64 * period_s).collect();
     let reader = Reader { trace, axis, times, grid: grid.clone() };

@@ -38,7 +38,10 @@ pub(super) fn speed_loop(
     let fast = |record: &&FineRecord| (record.period_s / speed_cycle_s - 1.0).abs() < 1e-3;
     let fine: Vec<&FineRecord> = records.iter().filter_map(|record| record.fine.as_ref()).filter(fast).collect();
     if fine.is_empty() {
-        return refuse(result, "no trace shows the speed loop at its own cycle: its integral runs between the position ticks");
+        return refuse(
+            result,
+            "no trace shows the speed loop at its own cycle: its integral runs between the position ticks",
+        );
     }
     let mut blocks = Blocks::new(2);
     let mut square = 0.0;
@@ -58,11 +61,15 @@ pub(super) fn speed_loop(
         }
         blocks.close();
     }
-    let Some(solution) = blocks.solve(&[0, 1]) else { return refuse(result, "the speed loop has nothing to do in this trace") };
+    let Some(solution) = blocks.solve(&[0, 1]) else {
+        return refuse(result, "the speed loop has nothing to do in this trace");
+    };
     let share = (blocks.residual_square(&[0, 1], &solution.theta) / square).sqrt();
     if share > LEFT_OVER_SHARE {
         let percent = percent_from_ratio(share);
-        let reason = format!("a PI controller leaves {percent:.0} % of the torque over: a filter or a reference model is in the loop");
+        let reason = format!(
+            "a PI controller leaves {percent:.0} % of the torque over: a filter or a reference model is in the loop"
+        );
         return refuse(result, &reason);
     }
     let (gain, gain_half) = solution.value(0);

@@ -3,10 +3,10 @@
 //! In: nothing (plain data). Out: [`AxisResult`]. Values are in the unit of their key of the machine file, so that a table, a JSON
 //! document and a machine file show the same number.
 
+use crate::base::AxisKind;
 use crate::base::Diagnostic;
 use crate::base::units::MM_PER_M;
 use crate::machine::Axis;
-use crate::base::AxisKind;
 
 /// What can be identified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

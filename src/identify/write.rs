@@ -20,13 +20,15 @@ pub fn machine_text(text: &str, machine: &Machine, results: &[AxisResult]) -> Re
         for estimate in &result.estimates {
             let key = format!("axes.{}.{}", axis.name, estimate.parameter.key(axis));
             let value = rounded(estimate);
-            let comment = format!("identified, 95 %: {} to {}", shown(estimate.low, estimate), shown(estimate.high, estimate));
+            let comment =
+                format!("identified, 95 %: {} to {}", shown(estimate.low, estimate), shown(estimate.high, estimate));
             put(&mut document, &key, Value::from(value), &comment).ok_or_else(|| fault(&key))?;
         }
         let whole = [Parameter::Inertia, Parameter::Viscous, Parameter::Coulomb];
         if whole.iter().all(|parameter| result.estimate(*parameter).is_some()) {
             let key = format!("axes.{}.drive.identified", axis.name);
-            put(&mut document, &key, Value::from(true), "inertia and friction from traces").ok_or_else(|| fault(&key))?;
+            put(&mut document, &key, Value::from(true), "inertia and friction from traces")
+                .ok_or_else(|| fault(&key))?;
         }
     }
     Ok(document.to_string())
@@ -67,7 +69,8 @@ fn put(document: &mut DocumentMut, key: &str, value: Value, comment: &str) -> Op
             let decor = old.decor().clone();
             let mut bare = old.clone();
             bare.decor_mut().clear();
-            let before = decor.suffix().and_then(|raw| raw.as_str()).unwrap_or("").trim().trim_start_matches('#').trim();
+            let before =
+                decor.suffix().and_then(|raw| raw.as_str()).unwrap_or("").trim().trim_start_matches('#').trim();
             let was = if before.is_empty() { format!("was {bare}") } else { format!("was {bare}: {before}") };
             value.decor_mut().set_prefix(decor.prefix().and_then(|raw| raw.as_str()).unwrap_or(" ").to_owned());
             value.decor_mut().set_suffix(format!(" # {comment}; {was}"));

@@ -17,10 +17,6 @@ pub struct Noise {
 }
 
 impl Noise {
-    pub fn none() -> Self {
-        Self { scale_lu: 0.0, current_a: 0.0, current_step_a: 0.0, seed: 1 }
-    }
-
     /// That of the issue: 1 um scale, 0.05 A noise, 0.02 A quantum.
     pub fn usual(seed: u64) -> Self {
         Self { scale_lu: 1e-3, current_a: 0.05, current_step_a: 0.02, seed }
@@ -36,16 +32,14 @@ pub fn machine(name: &str, sets: &[&str]) -> Machine {
 pub fn moves(period_s: f64, legs: &[(f64, f64, f64)]) -> Vec<f64> {
     let mut x = vec![0.0; (0.1 / period_s) as usize];
     for (way, speed, acceleration) in legs {
-        let start = *x.last().unwrap();
+        let start: f64 = *x.last().unwrap();
         // Time of a ramp with the mean acceleration of a raised cosine: half of its peak.
         let ramp_s = (2.0 * speed / acceleration).max(0.02);
         let constant_s = (way.abs() / speed - ramp_s).max(0.0);
         let peak = (way.abs() / (ramp_s + constant_s)).copysign(*way);
         let total_s = 2.0 * ramp_s + constant_s;
-        let share = |t: f64| t / ramp_s - (TAU * t / ramp_s).sin() / TAU;
-        // Integral of `share`.
+        // Integral of the speed of a raised-cosine acceleration.
         let lift = |t: f64| t * t / (2.0 * ramp_s) + ramp_s / (TAU * TAU) * ((TAU * t / ramp_s).cos() - 1.0);
-        let _ = share;
         let steps = (total_s / period_s).ceil() as usize;
         for k in 1..=steps {
             let t = (k as f64 * period_s).min(total_s);
@@ -53,7 +47,7 @@ pub fn moves(period_s: f64, legs: &[(f64, f64, f64)]) -> Vec<f64> {
             let place = if t < ramp_s {
                 peak * lift(t)
             } else if left < ramp_s {
-                start.mul_add(0.0, way - peak * lift(left))
+                way - peak * lift(left)
             } else {
                 peak * (lift(ramp_s) + t - ramp_s)
             };
@@ -118,6 +112,20 @@ pub fn trace(axis: &Axis, period_s: f64, signals: &[AxisSignals], stems: &[&str]
         });
     }
     trace
+}
+
+/// Five seconds with four speeds in both directions.
+pub fn legs() -> Vec<(f64, f64, f64)> {
+    vec![
+        (8.0, 15.0, 1000.0),
+        (-8.0, 15.0, 1000.0),
+        (30.0, 80.0, 1000.0),
+        (-30.0, 80.0, 1000.0),
+        (80.0, 200.0, 1500.0),
+        (-80.0, 200.0, 1500.0),
+        (90.0, 320.0, 1500.0),
+        (-90.0, 320.0, 1500.0),
+    ]
 }
 
 /// All signals that an identification can use.

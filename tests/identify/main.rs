@@ -6,4 +6,6 @@ mod random;
 mod test_machine;
 
 mod made;
+mod other_plant;
+mod refusals;
 mod trust;
