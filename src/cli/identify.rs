@@ -5,6 +5,7 @@
 
 use super::failure::Failure;
 use super::identify_control::{calibration, planning};
+use super::identify_page::page;
 use super::identify_tables::{document, tables};
 use super::inputs::{MachineChoice, Surroundings, TraceNames, refuse_same_file};
 use super::output::{ProgressLine, print, print_json, show};
@@ -57,6 +58,9 @@ pub(super) struct IdentifyArguments {
     /// Machine file to write, with the values, their intervals as comments, and everything else as it was; with --plan a folder
     #[arg(short, long, value_name = "MACHINE.toml")]
     pub(super) output: Option<PathBuf>,
+    /// Page to write: values with their intervals, refusals, friction over speed
+    #[arg(long, value_name = "PAGE.html", conflicts_with_all = ["plan", "smoothing"])]
+    report: Option<PathBuf>,
     /// One JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,
@@ -89,7 +93,7 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
         return calibration(arguments);
     }
     let inputs = || arguments.traces.iter().map(PathBuf::as_path);
-    if let Some(output) = &arguments.output {
+    for output in arguments.output.iter().chain(&arguments.report) {
         refuse_same_file(inputs(), output)?;
     }
     let loaded = arguments.machine.load_or_recorded(&arguments.traces)?;
@@ -110,17 +114,26 @@ pub(super) fn identify(arguments: &IdentifyArguments) -> Result<(), Failure> {
     if let Some(output) = &arguments.output {
         write(output, &loaded, &results)?;
     }
+    if let Some(report) = &arguments.report {
+        write_whole(report, &page(&results, machine, &arguments.traces))?;
+    }
     if arguments.json {
         let mut document = document(&results, machine, &arguments.traces);
         document["warnings"] = notes.iter().map(Warning::from).map(|warning| json!(warning)).collect();
         if let Some(output) = &arguments.output {
             document["output"] = json!(output.display().to_string());
         }
+        if let Some(report) = &arguments.report {
+            document["report"] = json!(report.display().to_string());
+        }
         print_json(&document)?;
     } else {
         print(&tables(&results, machine))?;
         if let Some(output) = &arguments.output {
             print(&format!("\nmachine file: {}\n", output.display()))?;
+        }
+        if let Some(report) = &arguments.report {
+            print(&format!("page: {}\n", report.display()))?;
         }
     }
     if results.iter().all(|result| result.estimates.is_empty()) { Err(Failure::told()) } else { Ok(()) }

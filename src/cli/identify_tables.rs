@@ -9,7 +9,7 @@ use crate::machine::{Axis, Machine};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
-fn axis_of<'m>(result: &AxisResult, machine: &'m Machine) -> Option<&'m Axis> {
+pub(super) fn axis_of<'m>(result: &AxisResult, machine: &'m Machine) -> Option<&'m Axis> {
     machine.axis_by_name(&result.axis).map(|id| machine.axis(id))
 }
 
@@ -59,7 +59,7 @@ fn values(result: &AxisResult, axis: &Axis) -> String {
 }
 
 /// So many digits as the width of the interval leaves a meaning, and one more.
-fn number(value: f64, width: f64) -> String {
+pub(super) fn number(value: f64, width: f64) -> String {
     let digits = if width > 0.0 { (2 - width.log10().floor() as i32).clamp(0, 9) } else { 6 };
     format!("{value:.*}", digits as usize)
 }

@@ -258,7 +258,7 @@ pub struct AxisResult {
     pub verdicts: Vec<String>,
     /// Where the torque came from.
     pub torque_source: Option<TorqueSource>,
-    /// For a picture: speed in lu/s, mean torque there and torque of the fitted law, in N m (N).
+    /// For a picture: speed of the motor in rad/s (m/s), mean torque there without inertia, and torque of the fitted law, in N m (N).
     pub friction_points: Vec<[f64; 3]>,
     /// Findings worth a warning.
     pub notes: Vec<Diagnostic>,

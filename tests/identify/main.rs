@@ -5,6 +5,8 @@ mod random;
 #[path = "../test_machine/mod.rs"]
 mod test_machine;
 
+mod chain;
+mod control;
 mod made;
 mod other_plant;
 mod refusals;
