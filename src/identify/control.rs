@@ -94,6 +94,10 @@ const BLOCK: usize = 60;
 const TIME_WEIGHT: f64 = 30.0;
 /// Paths that differ by more than this share of their length are not of one program.
 const LENGTH_SHARE: f64 = 0.03;
+/// And so are paths that lie apart by more than this share of it.
+const APART_SHARE: f64 = 0.01;
+/// Condition from which two settings count as one.
+const ALIKE: f64 = 40.0;
 /// An interval as a share of its value beyond which a value is refused.
 const WIDE_SHARE: f64 = 0.5;
 
@@ -239,8 +243,8 @@ impl Fit<'_> {
         let (mut last, mut moved) = (None, Vec::new());
         for pass in 0..passes {
             let (blocks, active) = self.linearised(&base, knobs, shape, sign)?;
-            moved = active;
-            let columns: Vec<usize> = (0..moved.len()).collect();
+            let columns = told_apart(&blocks, active.len());
+            moved = columns.iter().map(|column| active[*column]).collect();
             last = blocks.solve(&columns);
             let Some(solution) = &last else { break };
             if pass + 1 == passes {
@@ -299,6 +303,18 @@ impl Fit<'_> {
     }
 }
 
+/// Columns that are told apart, the first ones first: shares and jerks may act as one product.
+fn told_apart(blocks: &Blocks, width: usize) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::new();
+    for column in 0..width {
+        let trial: Vec<usize> = kept.iter().copied().chain([column]).collect();
+        if blocks.solve(&trial).is_some_and(|solution| solution.condition < ALIKE) {
+            kept = trial;
+        }
+    }
+    kept
+}
+
 /// Calibrates the control on one traced program, and looks at others.
 pub fn calibrate(
     fitted: &TracedProgram<'_>,
@@ -330,6 +346,10 @@ pub fn calibrate(
             "the path of the trace is {:.3} mm long, that of the program {:.3} mm",
             target.length_mm, before.length_mm
         )));
+    }
+    let apart_mm = before.sideways_rms_mm(&target);
+    if apart_mm > APART_SHARE * target.length_mm {
+        return Err(refused(&format!("the paths of trace and program are {apart_mm:.3} mm apart")));
     }
     progress("shape of the corners");
     let shape = fit.run(&SHAPE, true, PASSES.1);
@@ -439,8 +459,11 @@ fn take(
     let (_, solution, active) = done.unwrap_or((0.0, None, Vec::new()));
     for knob in knobs {
         let place = active.iter().position(|known| known == knob);
-        let what =
-            if shape { "no corner of this program shows it" } else { "nothing in this program is held back by it" };
+        let what = if shape {
+            "no corner of this program shows it"
+        } else {
+            "nothing in this program is held back by it, or it is not told apart from the values above"
+        };
         let (Some(place), Some(solution)) = (place, &solution) else {
             result.refusals.push((knob.key(), what.to_owned()));
             continue;

@@ -392,7 +392,9 @@ fn push_gain(solution: Option<&Solution>, found: &mut Vec<Estimate>, result: &mu
 fn lags(records: &[AxisRecord], axis: &Axis, result: &mut AxisResult) {
     if have(records, |record| &record.filtered_velocity_lu_s) {
         let response = |record: &AxisRecord, k: usize| at(&record.filtered_velocity_lu_s, k);
-        if let Some((gain, delay_s, share)) = taps(records, response) {
+        if let Some((gain, taps_s, share)) = taps(records, response) {
+            // A difference of two set-points is half a cycle late itself.
+            let delay_s = taps_s + records[0].period_s / 2.0;
             result.figures.push(Figure {
                 key: "setpoint_filter_delay_ms",
                 title: "delay of the set-point speed at the controller's input behind the set-point (a filter)"

@@ -57,6 +57,10 @@ const BLOCKS: f64 = 100.0;
 /// Rows of one direction, and time in it, below which it does not count.
 const DIRECTION_SHARE: f64 = 0.03;
 const DIRECTION_S: f64 = 0.1;
+/// Share of the highest acceleration below which the speed counts as constant, rows of it that count, and spread of one speed.
+const CONSTANT_SHARE: f64 = 0.05;
+const CONSTANT_ROWS: f64 = 100.0;
+const ONE_SPEED_SHARE: f64 = 0.1;
 /// Range of a rotary axis below which sine, cosine and constant are alike.
 const TURN_DEG: f64 = 40.0;
 
@@ -84,6 +88,18 @@ struct Covered {
     /// Time of motion forward and backward.
     direction_s: [f64; 2],
     range_lu: f64,
+    /// Rows without acceleration: time, sum of the speeds, of their squares.
+    constant: [f64; 3],
+}
+
+impl Covered {
+    /// All runs of constant speed have the same speed: that of the motor; `None` if there are several, or none.
+    fn one_speed_rad_s(&self) -> Option<f64> {
+        let [count, sum, square] = self.constant;
+        let mean = sum / count;
+        let spread = (square / count - mean * mean).max(0.0).sqrt();
+        (count > CONSTANT_ROWS && spread < ONE_SPEED_SHARE * mean).then_some(mean)
+    }
 }
 
 fn covered(motions: &[Motion]) -> Covered {
@@ -102,6 +118,10 @@ fn covered(motions: &[Motion]) -> Covered {
             all.blocks.push_in(k / per_block, &row, motion.torque_n_m[k]);
             all.torque_max_n_m = all.torque_max_n_m.max(motion.torque_n_m[k].abs());
             all.direction_s[usize::from(row[TC] < 0.0)] += motion.period_s;
+            if row[J].abs() < CONSTANT_SHARE * acceleration_max_rad_s2 {
+                let speed = row[B].abs();
+                all.constant = [all.constant[0] + 1.0, all.constant[1] + speed, all.constant[2] + speed * speed];
+            }
             lowest = motion.position_lu[k].min(lowest);
             highest = motion.position_lu[k].max(highest);
         }
@@ -149,7 +169,10 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, folded: bool, result: &m
         |place: usize| matches!(columns[place], J | B | TC) && shifts[place] > 0.02 * solution.theta[place].abs();
     found.misfit = (0..columns.len()).any(moved);
     for (place, column) in columns.iter().enumerate() {
-        let Some(parameter) = parameter_of(*column, both) else { continue };
+        let Some(parameter) = parameter_of(*column, both).filter(|parameter| result.refusal(*parameter).is_none())
+        else {
+            continue;
+        };
         let (value, noise) = solution.value(place);
         let half = noise.hypot(METHOD_SHARE * value) + SHIFT_TAKEN * shifts[place];
         let estimate = Estimate::around(parameter, value, half, Means::OneShot);
@@ -190,6 +213,18 @@ fn columns(all: &Covered, axis: &Axis, folded: bool, result: &mut AxisResult) ->
         let reason = format!("the axis moves in {way} direction only: friction and gravity are one constant torque");
         for parameter in [Parameter::Coulomb, Parameter::Gravity] {
             result.refuse(parameter, reason.as_str(), "record the same motion in the other direction as well");
+        }
+    }
+    if let Some(speed) = all.one_speed_rad_s() {
+        let reason = format!(
+            "the axis runs at one constant speed only ({speed:.1} rad/s at the motor): both frictions are one torque there"
+        );
+        for parameter in [Parameter::Viscous, Parameter::Coulomb] {
+            result.refuse(
+                parameter,
+                reason.as_str(),
+                "record constant speeds from 5 to 90 % of the highest (`sollwert identify --plan`)",
+            );
         }
     }
     columns.push(G0);

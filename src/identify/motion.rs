@@ -138,8 +138,9 @@ fn highest(speed: &[f64]) -> f64 {
 fn moving(speed: &[f64], slow: f64, half: usize) -> Vec<bool> {
     let mut last_still = None::<usize>;
     let mut before = vec![0_usize; speed.len()];
-    let breaks: Vec<bool> =
-        (0..speed.len()).map(|k| !(speed[k].abs() > slow) || (k > 0 && speed[k - 1] * speed[k] < 0.0)).collect();
+    let breaks: Vec<bool> = (0..speed.len())
+        .map(|k| speed[k].is_nan() || speed[k].abs() <= slow || (k > 0 && speed[k - 1] * speed[k] < 0.0))
+        .collect();
     for (k, still) in breaks.iter().enumerate() {
         if *still {
             last_still = Some(k);

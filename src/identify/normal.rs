@@ -92,7 +92,7 @@ impl Blocks {
             product += block_product;
         }
         let rows = self.rows();
-        if rows <= p {
+        if p == 0 || rows <= p {
             return None;
         }
         // Columns of length 1: their scale is no matter of their condition.
@@ -101,9 +101,12 @@ impl Blocks {
             return None;
         }
         let scaled = DMatrix::from_fn(p, p, |i, j| gram[(i, j)] * scale[i] * scale[j]);
+        if !scaled.iter().all(|value| value.is_finite()) {
+            return None;
+        }
         let eigen = scaled.symmetric_eigenvalues();
         let condition = (eigen.max() / eigen.min().max(0.0)).sqrt();
-        if !(condition < CONDITION_MAX) {
+        if condition.is_nan() || condition >= CONDITION_MAX {
             return None;
         }
         let inverse = scaled.cholesky()?.inverse();

@@ -79,11 +79,12 @@ impl Reader<'_> {
     /// Values in SI at the motor.
     fn raw(&self, stem: &str) -> Option<Vec<f64>> {
         let signal = self.signal(stem)?;
-        let values = if signal.times == self.grid {
+        let on_grid = matches!(self.grid, TimeGrid::Uniform { .. }) && signal.times == self.grid;
+        let values = if on_grid && signal.values.len() == self.times.len() {
             signal.values.clone()
         } else {
-            // A signal of the position controller stands in the file when it changes, one of the interpolator is a sample of something smooth.
-            let method = if signal.clock == Clock::Interpolator { Method::Linear } else { Method::Hold };
+            // A signal of the position controller stands in the file when it changes; any other is a sample of something smooth.
+            let method = if signal.clock == Clock::Servo { Method::Hold } else { Method::Linear };
             let times: Vec<f64> = self.times.iter().map(|time_s| time_s + signal.meaning.delay_s).collect();
             signal.resampled(&times, method)
         };

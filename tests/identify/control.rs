@@ -77,7 +77,6 @@ fn a_control_with_other_settings_is_found_and_predicts_an_unseen_program() {
     ];
     let result =
         calibrate(&pairs[0], &pairs[1..], &start, &mut |_| {}).unwrap_or_else(|d| panic!("{}", d.render(false)));
-    println!("{result:#?}");
     for (key, value) in
         [("smoothing.alpha", 2.1), ("smoothing.tolerance_ratio", 0.95), ("smoothing.tolerance_ratio_reversal", 0.75)]
     {

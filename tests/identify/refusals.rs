@@ -37,7 +37,8 @@ fn one_speed_does_not_tell_viscous_friction() {
     let back_and_forth: Vec<(f64, f64, f64)> =
         (0..6).map(|k| (if k % 2 == 0 { 40.0 } else { -40.0 }, 40.0, 8000.0)).collect();
     let result = of(&back_and_forth, &ALL, &[]);
-    assert!(result.refusal(Parameter::Viscous).is_some(), "{:?}", result.estimate(Parameter::Viscous));
+    refused(&result, Parameter::Viscous, "one constant speed only");
+    refused(&result, Parameter::Coulomb, "one constant speed only");
 }
 
 #[test]
