@@ -11,7 +11,7 @@ use super::record::{AxisRecord, read};
 use super::refine::refine;
 use super::speed_loop::speed_loop;
 use super::staged::staged;
-use super::wire::{AxisResult, Estimate, Figure, Parameter, TorqueSource};
+use super::wire::{AxisResult, Estimate, Figure, Means, Parameter, TorqueSource};
 use crate::base::units::{MS_PER_S, percent_from_ratio};
 use crate::base::{AxisId, Diagnostic};
 use crate::machine::{Axis, DriveData, Machine};
@@ -267,14 +267,24 @@ fn unfold(
     ));
 }
 
+/// Six decimals of a trace: of a gain, and of a delay.
+const ROUNDING_SHARE: f64 = 1e-6;
+const ROUNDING_MS: f64 = 1e-4;
+
 /// Units of the keys, order of the tables, and a reason for everything that is not there.
 fn finish(result: &mut AxisResult, found: Vec<Estimate>) {
     let bordered = |estimate: Estimate| match estimate.parameter {
         Parameter::SetpointDelay | Parameter::FeedforwardDelay | Parameter::SpeedResetTime => estimate.scaled(MS_PER_S),
         _ => estimate,
     };
+    // A law that holds exactly in the trace is known to what the decimals of a trace are worth.
+    let rounding = |estimate: Estimate| match estimate.parameter {
+        _ if !matches!(estimate.means, Means::Lags | Means::ControlLaw) => estimate,
+        Parameter::SetpointDelay | Parameter::FeedforwardDelay => estimate.widened(ROUNDING_MS),
+        _ => estimate.widened(ROUNDING_SHARE * estimate.value.abs()),
+    };
     let order = |parameter: Parameter| Parameter::ALL.iter().position(|known| *known == parameter);
-    result.estimates = found.into_iter().map(bordered).collect();
+    result.estimates = found.into_iter().map(bordered).map(rounding).collect();
     result.estimates.sort_by_key(|estimate| order(estimate.parameter));
     result.refusals.retain(|refusal| result.estimates.iter().all(|known| known.parameter != refusal.parameter));
     result.refusals.sort_by_key(|refusal| order(refusal.parameter));

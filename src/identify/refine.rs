@@ -336,7 +336,9 @@ impl Problem<'_> {
             let value = get(&self.data, *parameter);
             let first = start.estimates.iter().find(|estimate| estimate.parameter == *parameter);
             // What the last pass would still change, and the grain of the differences, belong to the interval.
-            let half = noise.hypot(GRAIN_SHARE * value) + solution.theta[j].abs();
+            // Gravity may be 0: dry friction is the size of it.
+            let size = if *parameter == Parameter::Gravity { self.data.mechanics.coulomb_friction_n_m } else { value };
+            let half = noise.hypot(GRAIN_SHARE * size) + solution.theta[j].abs();
             let estimate = Estimate::around(*parameter, value, half, Means::OutputError);
             match (parameter, first) {
                 (_, Some(first)) if half > first.half() => found.push(*first),
