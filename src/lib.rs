@@ -102,5 +102,6 @@ pub mod recorder;
 pub mod kernel;
 pub mod trace;
 pub mod compare;
+pub mod tune;
 pub mod report;
 pub mod cli;
