@@ -11,8 +11,9 @@
 //! Does not choose the channels and does not stretch one trace to the other.
 
 use super::series::Series;
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
+use rustfft::algorithm::Radix4;
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection};
 
 /// The same quantity in both traces.
 #[derive(Clone, Copy, Debug)]
@@ -152,37 +153,31 @@ fn coarse(channels: &[Channel<'_>]) -> Option<Coarse> {
     if !(a.total() > 0.0 && b.total() > 0.0) {
         return None;
     }
-    let product = correlate(&a, &b)?;
+    let product = correlate(&a, &b);
     let (shift, correlation_ratio) = best_shift(&a, &b, &product)?;
     Some(Coarse { offset_s: b.start_s - a.start_s + shift as f64 * bin_s, correlation_ratio, bin_s })
 }
 
 /// `c[k]` = sum over i of a[i] b[i + k], for k from 0; negative k stand at the end, modulo the length.
-fn correlate(a: &Binned, b: &Binned) -> Option<Vec<f64>> {
+fn correlate(a: &Binned, b: &Binned) -> Vec<f64> {
     let length = (a.bins() + b.bins()).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, backward) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
-    let mut sum = vec![Complex::new(0.0, 0.0); length / 2 + 1];
-    let spectrum = |values: &[f64]| {
-        let mut padded = vec![0.0; length];
-        padded[..values.len()].copy_from_slice(values);
-        let mut spectrum = forward.make_output_vec();
-        forward.process(&mut padded, &mut spectrum).ok().map(|()| spectrum)
-    };
+    // Not the planner: it would choose by the processor's instructions, and the last bits of a result with them.
+    let (forward, backward) = (Radix4::new(length, FftDirection::Forward), Radix4::new(length, FftDirection::Inverse));
+    let mut sum = vec![Complex::new(0.0, 0.0); length];
     for (one, other) in a.channels.iter().zip(&b.channels) {
-        let (one, other) = (spectrum(one)?, spectrum(other)?);
-        for (s, (x, y)) in sum.iter_mut().zip(one.iter().zip(&other)) {
-            *s += x.conj() * y;
+        // Two real signals in one transform: z = x + i y, from which X = (Z[k] + Z*[-k]) / 2 and i Y = (Z[k] - Z*[-k]) / 2.
+        let mut both = vec![Complex::new(0.0, 0.0); length];
+        both.iter_mut().zip(one).for_each(|(z, x)| z.re = *x);
+        both.iter_mut().zip(other).for_each(|(z, y)| z.im = *y);
+        forward.process(&mut both);
+        for (k, s) in sum.iter_mut().enumerate() {
+            let (z, mirrored) = (both[k], both[(length - k) % length].conj());
+            let (x, iy) = ((z + mirrored) * 0.5, (z - mirrored) * 0.5);
+            *s += x.conj() * Complex::new(iy.im, -iy.re);
         }
     }
-    // The inverse wants exactly real ends.
-    sum[0].im = 0.0;
-    sum[length / 2].im = 0.0;
-    let mut product = vec![0.0; length];
-    backward.process(&mut sum, &mut product).ok()?;
-    let norm = length as f64;
-    product.iter_mut().for_each(|value| *value /= norm);
-    Some(product)
+    backward.process(&mut sum);
+    sum.iter().map(|value| value.re / length as f64).collect()
 }
 
 /// The shift with the best correlation in its overlap.

@@ -1,9 +1,10 @@
-//! Tests of the room `feed`: closed forms, published figures, limits seen from outside.
+//! Tests of the rooms `feed` and `interpolator`: closed forms, published figures, limits seen from outside.
 
 mod blocked;
 mod circular_contours;
 mod continuous;
 mod curves;
+mod interpolator;
 mod overrides;
 mod printed_loop;
 mod profile;

@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 
 #[path = "../test_machine/mod.rs"]
-mod test_machine;
+pub mod test_machine;
 
 use sollwert::base::Diagnostic;
 use sollwert::interpreter::{Interpreter, Listing, Move};

@@ -3,12 +3,8 @@
 //! In: programs that show what they compute with MSG. Out: nothing; asserts. Priorities are judged by an evaluator of its own (a
 //! shunting-yard on the table of the programming manual 12/2019, p. 444); conversions by the manual's table of type conversions.
 
-mod nc_machine;
-#[path = "random/mod.rs"]
-mod random;
-
-use nc_machine::xyz;
-use random::Random;
+use crate::nc_machine::xyz;
+use crate::random::Random;
 use sollwert::interpreter::{Event, Interpreter};
 use sollwert::program::ProgramSource;
 

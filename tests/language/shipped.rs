@@ -2,9 +2,7 @@
 //!
 //! `programs/*.moves` are golden: after a wanted change run with `SOLLWERT_BLESS=1` and read the difference.
 
-mod nc_machine;
-
-use nc_machine::{Run, run_bytes, xyz, xyzbc};
+use crate::nc_machine::{Run, run_bytes, xyz, xyzbc};
 use sollwert::base::{AxisId, Severity};
 use sollwert::interpreter::{Event, MoveKind, check};
 use sollwert::machine::PathMode;

@@ -1,8 +1,6 @@
 //! Text -> blocks: encodings, recovery, the table of words, the fast path against the parser, and that no input breaks anything.
 
-mod nc_machine;
-
-use nc_machine::{run_bytes, xyz, xyzbc};
+use crate::nc_machine::{run_bytes, xyz, xyzbc};
 use proptest::prelude::*;
 use sollwert::base::Severity;
 use sollwert::interpreter::{Event, check, known_words};
@@ -321,7 +319,7 @@ proptest! {
 
     #[test]
     fn mutated_programs_never_break_anything(at in 0usize..2000, byte in any::<u8>(), cut in 0usize..40) {
-        let mut bytes = include_bytes!("../programs/pocket.mpf").to_vec();
+        let mut bytes = include_bytes!("../../programs/pocket.mpf").to_vec();
         let at = at % bytes.len();
         bytes[at] = byte;
         bytes.drain(at..(at + cut).min(bytes.len()));
@@ -346,9 +344,9 @@ proptest! {
         };
         let fast = run_bytes(text("").as_bytes(), &xyzbc());
         let slow = run_bytes(text("/").as_bytes(), &xyzbc());
-        let alarm = |run: &nc_machine::Run| run.alarm.as_ref().map(|alarm| (alarm.code, alarm.line(), alarm.message.clone()));
+        let alarm = |run: &crate::nc_machine::Run| run.alarm.as_ref().map(|alarm| (alarm.code, alarm.line(), alarm.message.clone()));
         prop_assert_eq!(alarm(&fast), alarm(&slow));
-        let strip = |run: &nc_machine::Run| run.moves.iter().map(|shown| (shown.block, shown.kind.clone(), shown.end, shown.feed.clone(), shown.modes.clone())).collect::<Vec<_>>();
+        let strip = |run: &crate::nc_machine::Run| run.moves.iter().map(|shown| (shown.block, shown.kind.clone(), shown.end, shown.feed.clone(), shown.modes.clone())).collect::<Vec<_>>();
         prop_assert_eq!(strip(&fast), strip(&slow));
         prop_assert_eq!(fast.warnings.len(), slow.warnings.len());
     }

@@ -1,8 +1,6 @@
 //! Language and modal state: programs with their moves worked out by hand.
 
-mod nc_machine;
-
-use nc_machine::{run, run_bytes, xyz, xyzbc};
+use crate::nc_machine::{run, run_bytes, xyz, xyzbc};
 use sollwert::base::units::{mm_s_from_mm_min, rad_from_deg};
 use sollwert::interpreter::{Event, Feed, Interpreter, MoveKind};
 use sollwert::machine::{AccelerationMode, PathMode};

@@ -1,11 +1,6 @@
 //! Frames: what a program with TRANS, ROT, SCALE, MIRROR and zero offsets comes to, by hand-derived positions.
 
-#[path = "nc_machine/mod.rs"]
-mod nc_machine;
-#[path = "random/mod.rs"]
-mod random;
-
-use nc_machine::{run, run_bytes, xyzbc};
+use crate::nc_machine::{run, run_bytes, xyzbc};
 use sollwert::base::{AxisId, AxisVector, PerAxis};
 use sollwert::interpreter::{Component, Frame, GeometryAxes, MoveKind};
 use std::f64::consts::PI;
@@ -170,7 +165,7 @@ fn xyz_axes() -> GeometryAxes {
     [0, 1, 2].map(|index| Some(AxisId::new(index)))
 }
 
-fn random_frame(random: &mut random::Random) -> Frame {
+fn random_frame(random: &mut crate::random::Random) -> Frame {
     let mut frame = Frame::rotation(xyz_axes(), [0, 1, 2].map(|_| random.between(-4.0, 4.0)));
     for axis in AxisId::first(4) {
         frame.set_component_lu(axis, Component::Translation, random.between(-100.0, 100.0));
@@ -181,7 +176,7 @@ fn random_frame(random: &mut random::Random) -> Frame {
     frame
 }
 
-fn random_point(random: &mut random::Random) -> AxisVector {
+fn random_point(random: &mut crate::random::Random) -> AxisVector {
     PerAxis::from_fn(|axis| if axis.index() < 4 { random.between(-100.0, 100.0) } else { 0.0 })
 }
 
@@ -191,7 +186,7 @@ fn assert_near(a: &AxisVector, b: &AxisVector, what: &str) {
 
 #[test]
 fn inverse_chain_and_components_agree_with_points() {
-    let mut random = random::Random::new(20_260_101);
+    let mut random = crate::random::Random::new(20_260_101);
     for round in 0..2000 {
         let what = format!("round {round}");
         let (a, b, c) = (random_frame(&mut random), random_frame(&mut random), random_frame(&mut random));

@@ -1,14 +1,11 @@
-//! Tests of the room `interpolator`: time without rounding, exact ends, the fine interpolator.
+//! The room `interpolator`: time without rounding, exact ends, the fine interpolator.
 
-#[path = "feed/support.rs"]
-mod support;
-
+use crate::support::{Program, Random, spinner, total_s};
 use sollwert::base::{AxisId, TimeBase};
 use sollwert::feed::PlannedPiece;
 use sollwert::interpolator::{AxisSetpoint, FineInterpolator, Interpolator, Setpoint};
 use sollwert::interpreter::Event;
 use sollwert::machine::{FineInterpolation, Machine, PathMode};
-use support::{Program, Random, spinner, total_s};
 
 const X: AxisId = AxisId::new(0);
 
@@ -66,7 +63,7 @@ fn no_block_is_rounded_to_cycles() {
         let walk = Random::new(seed).walk(200, 0.05, 0.5);
         let planned = Program::polyline(PathMode::ExactStop, 3000.0, &walk).planned(&machine);
         let (time_s, end) = (total_s(&planned), walk[199]);
-        let setpoints = support::sample(&machine, planned);
+        let setpoints = crate::support::sample(&machine, planned);
         assert_eq!(setpoints.len() - 1, (time_s / 0.008 * (1.0 - 1e-9)).ceil() as usize);
         assert_eq!(last(&setpoints).axes[X].position_lu, end[0]);
     }
@@ -79,7 +76,7 @@ fn carried_time_equals_time_from_the_start() {
     for seed in 0..10 {
         let walk = Random::new(seed).walk(60, 0.01, 5.0);
         let planned = Program::polyline(PathMode::G642, 6000.0, &walk).planned(&machine);
-        let setpoints = support::sample(&machine, planned.clone());
+        let setpoints = crate::support::sample(&machine, planned.clone());
         for (k, setpoint) in setpoints.iter().enumerate().take(setpoints.len() - 1) {
             let expected = position_mm(&planned, k as f64 * 1e-3);
             assert!((setpoint.axes[X].position_lu - expected).abs() < 1e-9, "seed {seed} tick {k}");

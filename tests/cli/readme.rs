@@ -86,7 +86,9 @@ fn every_command_runs_as_it_stands() {
                 let whole = fs::read(&written).expect("the recording");
                 fs::write(folder.join("broken.mcap"), &whole[..whole.len() * 2 / 3]).expect("a broken recording");
                 // And the two that it compares.
-                ["a.mcap", "b.mcap"].map(|name| fs::write(folder.join(name), &whole).expect("a recording"));
+                for name in ["a.mcap", "b.mcap"] {
+                    fs::write(folder.join(name), &whole).expect("a recording");
+                }
             }
         }
         tried += 1;

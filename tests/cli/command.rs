@@ -13,7 +13,7 @@ fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(folder.join("directory")).expect("a new folder");
-    let machine = include_str!("../machines/spinner_mvc850.toml");
+    let machine = include_str!("../../machines/spinner_mvc850.toml");
     for (file, text) in
         [("good.mpf", PROGRAM), ("machine.toml", machine), ("empty", ""), ("junk", "\u{1}\u{2}junk\u{3}")]
     {

@@ -1,9 +1,6 @@
 //! Tools: which edge is active, what its length does to the axes, and what the workshop file says, by hand-derived positions.
 
-#[path = "nc_machine/mod.rs"]
-mod nc_machine;
-
-use nc_machine::{xyz, xyzbc};
+use crate::nc_machine::{xyz, xyzbc};
 use sollwert::base::diagnostics::SourceText;
 use sollwert::base::{AxisId, Diagnostic};
 use sollwert::interpreter::{Interpreter, Move, MoveKind, Setup};

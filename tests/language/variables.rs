@@ -2,9 +2,7 @@
 //!
 //! In: programs that write what they compute into R parameters or messages. Out: nothing; asserts what comes out as messages.
 
-mod nc_machine;
-
-use nc_machine::xyz;
+use crate::nc_machine::xyz;
 use sollwert::interpreter::{Event, Interpreter, MainRun, MoveKind, Setup};
 use sollwert::program::{ProgramSource, SYSTEM_VARIABLES};
 
@@ -211,7 +209,7 @@ fn traces_markers_and_clocks() {
 
 #[test]
 fn the_documentation_lists_every_system_variable() {
-    let text = include_str!("../docs/system-variables.md");
+    let text = include_str!("../../docs/system-variables.md");
     for variable in SYSTEM_VARIABLES {
         let access = if variable.writable { "read, write" } else { "read" };
         let stop = if variable.main_run { "yes" } else { "no" };

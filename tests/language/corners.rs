@@ -1,8 +1,6 @@
 //! Words of corners and tolerances: what the moves carry, and what is refused.
 
-mod nc_machine;
-
-use nc_machine::{run, run_bytes, xyzbc};
+use crate::nc_machine::{run, run_bytes, xyzbc};
 use sollwert::base::AxisId;
 use sollwert::interpreter::{Compressor, CornerShape, Modes, Move};
 use sollwert::machine::{AccelerationMode, DynamicsMode, PathMode};

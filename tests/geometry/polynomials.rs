@@ -1,8 +1,6 @@
 //! Splines, polynomials and arcs in any plane, from outside: closed forms, finite differences, exact ends, what is no curve.
 
-mod random;
-
-use random::Random;
+use crate::random::Random;
 use sollwert::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use sollwert::geometry::{Curve, CurveState, PolynomialCurve, SpatialArc};
 use sollwert::interpreter::{PolynomialGeometry, PolynomialPiece, SpatialArcGeometry};

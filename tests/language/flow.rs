@@ -1,9 +1,6 @@
 //! Jumps, repeated parts, skip levels.
 
-#[path = "nc_machine/mod.rs"]
-mod nc_machine;
-
-use nc_machine::{run, xyz};
+use crate::nc_machine::{run, xyz};
 use sollwert::interpreter::{Interpreter, Setup};
 use sollwert::program::{ProgramSource, codes};
 

@@ -4,9 +4,7 @@
 //! `;       ^^^ E0104 expected a number`. `;^all` marks the whole block. `check` must report this and nothing else, and a run must end
 //! there or, where the mistake can be seen only by reading, earlier.
 
-mod nc_machine;
-
-use nc_machine::{run_bytes, xyz};
+use crate::nc_machine::{run_bytes, xyz};
 use sollwert::base::Diagnostic;
 use sollwert::interpreter::check;
 use sollwert::program::ProgramSource;

@@ -1,11 +1,6 @@
 //! Feed, dynamics, spindles and positioning axes, from the word to the set-point: closed forms and differences of positions.
 
-#[path = "random/mod.rs"]
-mod random;
-#[path = "test_machine/mod.rs"]
-mod test_machine;
-
-use random::Random;
+use crate::random::Random;
 use sollwert::base::AxisId;
 use sollwert::interpreter::{Event, Feed, Interpreter, Move, MoveKind};
 use sollwert::kernel::{Kernel, Status};
@@ -37,7 +32,7 @@ fn source(text: &str) -> ProgramSource {
 }
 
 fn machine(sets: &[&str]) -> Machine {
-    test_machine::with_axes(&["X", "Y", "Z", "U", "A"], sets)
+    crate::nc_machine::test_machine::with_axes(&["X", "Y", "Z", "U", "A"], sets)
 }
 
 fn replay(machine: &Machine, text: &str) -> Replay {

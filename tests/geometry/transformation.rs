@@ -1,10 +1,7 @@
 //! q(s) of a piece of path seen from turned tables and heads: against the pose of the tool (another formula, other code), a closed form
 //! in complex numbers, and difference quotients.
 
-mod random;
-mod test_machine;
-
-use random::Random;
+use crate::random::Random;
 use sollwert::base::{AxisId, AxisVector, MachinePoint, PartPoint, PerAxis};
 use sollwert::geometry::{Curve, Line};
 use sollwert::interpreter::{ArcGeometry, Feed, Modes, ToolOffset};
@@ -24,7 +21,7 @@ fn linear() -> PerAxis<bool> {
 }
 
 fn kinematics(table: Vec<RotaryJoint>, head: Vec<RotaryJoint>) -> Kinematics {
-    let axes = test_machine::with_axes(&["X", "Y", "Z", "A", "B", "C"], &[]);
+    let axes = crate::test_machine::with_axes(&["X", "Y", "Z", "A", "B", "C"], &[]);
     Kinematics::new(&Machine { kinematics: KinematicsSettings::Rotary { table, head }, ..axes })
 }
 

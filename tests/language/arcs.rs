@@ -1,8 +1,6 @@
 //! Arcs: centres, radii, planes, helices, tolerances. Geometry is checked from outside, on the emitted move.
 
-mod nc_machine;
-
-use nc_machine::{run, xyz};
+use crate::nc_machine::{run, xyz};
 use proptest::prelude::*;
 use sollwert::base::{AxisId, PartPoint};
 use sollwert::interpreter::{ArcGeometry, Move, MoveKind};
@@ -147,7 +145,7 @@ proptest! {
             format!("I{:.3} J{:.3}", -xs, -ys)
         };
         let text = format!("G1 X{xs:.3} Y{ys:.3} F1\nG{g} X{xe:.3} Y{ye:.3} {form}");
-        let result = nc_machine::run_bytes(text.as_bytes(), &xyz());
+        let result = crate::nc_machine::run_bytes(text.as_bytes(), &xyz());
         prop_assert!(result.alarm.is_none(), "{text}\n{}", result.alarm().message);
         let found = arcs(&result.moves);
         let (from, shown, arc) = &found[0];

@@ -3,9 +3,6 @@
 //! The `.moves` were written by hand from the rules that the head of each program states, not by running it. A program names its
 //! machine in its first line, and behind it what lies around it (`; gud: FILE`, `; skip: 2`). A difference is shown line by line, so that one reads which rule is broken.
 
-#[path = "test_machine/mod.rs"]
-mod test_machine;
-
 use sollwert::interpreter::{Interpreter, Listing, Setup};
 use sollwert::program::ProgramSource;
 use std::fmt::Write;
@@ -38,7 +35,10 @@ fn head<'a>(text: &'a str, key: &str) -> Option<&'a str> {
 /// Moves of a program, and below them what was reported: there should be nothing.
 fn listing(path: &Path) -> String {
     let text = std::fs::read_to_string(path).unwrap();
-    let machine = test_machine::shipped(head(&text, "machine").expect("the first line names the machine"), &[]);
+    let machine = crate::nc_machine::test_machine::shipped(
+        head(&text, "machine").expect("the first line names the machine"),
+        &[],
+    );
     let open = |name: &str| ProgramSource::from_file(&folder().join(name)).unwrap();
     let mut setup = Setup::from(ProgramSource::from_file(path).unwrap());
     setup.definitions = head(&text, "gud").map(open).into_iter().collect();

@@ -1,9 +1,6 @@
 //! Program files: streamed from the disk as from memory, changed while they are read, archives.
 
-#[path = "nc_machine/mod.rs"]
-mod nc_machine;
-
-use nc_machine::{run_bytes, xyz};
+use crate::nc_machine::{run_bytes, xyz};
 use sollwert::interpreter::{Interpreter, Listing};
 use sollwert::program::{ProgramSource, ProgramText, Window, codes};
 use std::fmt::Write as _;

@@ -1,8 +1,6 @@
 //! The path parameter is arc length to 1e-9: every kind of curve against another quadrature, nasty ones among them.
 
-mod random;
-
-use random::Random;
+use crate::random::Random;
 use sollwert::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use sollwert::geometry::{Arc, Curve, HermiteBlend, PolynomialCurve, SpatialArc};
 use sollwert::interpreter::{ArcGeometry, PolynomialGeometry, PolynomialPiece, SpatialArcGeometry};

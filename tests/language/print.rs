@@ -2,12 +2,8 @@
 //!
 //! Columns are left out of the comparison: they say where a word stands, and a printed line stands elsewhere.
 
-mod nc_machine;
-#[path = "random/mod.rs"]
-mod random;
-
-use nc_machine::{xyz, xyzbc};
-use random::Random;
+use crate::nc_machine::{xyz, xyzbc};
+use crate::random::Random;
 use sollwert::program::{Block, Dialect, ProgramSource, Window, parse, print};
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,6 @@
 //! CIP, CT, AR, polar coordinates, splines and POLY: from text to moves. Curves are evaluated here on their own.
 
-mod nc_machine;
-
-use nc_machine::{Run, run, run_bytes, xyz, xyzbc};
+use crate::nc_machine::{Run, run, run_bytes, xyz, xyzbc};
 use sollwert::base::{AxisId, PartPoint};
 use sollwert::interpreter::{ArcGeometry, Move, MoveKind, PolynomialPiece};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

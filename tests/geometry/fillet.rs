@@ -4,9 +4,7 @@
 use sollwert::geometry::{ArcCorner, Fillet, Junction, NoFillet, PlaneArc, Sense};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-#[path = "random/mod.rs"]
-mod random;
-use random::Random;
+use crate::random::Random;
 
 use Sense::{Clockwise, CounterClockwise};
 

@@ -1,7 +1,5 @@
 //! Pose of the tool against published examples, and q(s) of a contour piece.
 
-mod test_machine;
-
 use sollwert::base::{AxisId, AxisVector, MachinePoint, PartPoint, PerAxis};
 use sollwert::geometry::{Curve, Line};
 use sollwert::interpreter::{Feed, Modes};
@@ -16,7 +14,7 @@ const ROTARY: [AxisId; 2] = [AxisId::new(3), AxisId::new(4)];
 
 /// X, Y, Z and two rotary axes on the given chain.
 fn machine(rotary: [&str; 2], kinematics: KinematicsSettings) -> Machine {
-    Machine { kinematics, ..test_machine::with_axes(&["X", "Y", "Z", rotary[0], rotary[1]], &[]) }
+    Machine { kinematics, ..crate::test_machine::with_axes(&["X", "Y", "Z", rotary[0], rotary[1]], &[]) }
 }
 
 fn joint(place: usize, direction: [f64; 3], point_mm: [f64; 3]) -> RotaryJoint {

@@ -1,9 +1,6 @@
 //! Sub-programs: where they are found, what is handed over, how they end.
 
-#[path = "nc_machine/mod.rs"]
-mod nc_machine;
-
-use nc_machine::xyz;
+use crate::nc_machine::xyz;
 use sollwert::base::Diagnostic;
 use sollwert::interpreter::{Event, Interpreter, Listing, Move, Setup, check};
 use sollwert::program::{ProgramId, ProgramSource, codes};

@@ -1,0 +1,4 @@
+//! Tests of the room `kernel`: whole runs, and what each limit costs.
+
+mod runs;
+mod what_if;
