@@ -8,9 +8,11 @@ use crate::base::{AxisId, MachinePoint};
 use crate::kinematics::Kinematics;
 use crate::machine::{KinematicsSettings, Machine};
 
-/// Segments looked at behind and before the nearest one of the set-point before.
+/// Segments looked at behind the nearest one of the set-point before; forward all up to the set-point, so that a path that turns back close to
+/// itself is not followed backwards.
 const BEHIND: usize = 8;
-const BEFORE: usize = 24;
+/// Most of them: at 1 ms and a lag of 60 ms the nearest point is 60 behind.
+const HISTORY: usize = 512;
 
 /// Points of the tool in the part.
 pub(super) struct Tool {
@@ -48,8 +50,8 @@ impl Tool {
                 actual.0[*axis] -= lags_lu.get(k * steps).copied().unwrap_or(0.0);
             }
             let point_mm = self.point_mm(&actual);
-            let first = nearest.saturating_sub(BEHIND);
-            let last = (nearest + BEFORE).min(k + 2).min(path_mm.len().saturating_sub(1));
+            let first = nearest.saturating_sub(BEHIND).max(k.saturating_sub(HISTORY));
+            let last = (k + 2).min(path_mm.len().saturating_sub(1));
             let mut best = (f64::INFINITY, nearest, [0.0; 3]);
             for segment in first..last.max(first + 1) {
                 let from = path_mm.get(segment).copied().unwrap_or(point_mm);

@@ -26,6 +26,8 @@ pub struct Course {
     pub measured: bool,
     /// Time.
     pub duration_s: f64,
+    /// What the program gave rise to.
+    pub warnings: Vec<Diagnostic>,
     pub(super) axes: Vec<AxisCourse>,
     /// Postures at t_s, of all axes of the machine.
     pub(super) postures: Vec<MachinePoint>,
@@ -96,11 +98,12 @@ pub fn course_of_program(
             sent[row.axis.index()].push(row.setpoint);
         }
         active.push(output.setpoint.is_some_and(|setpoint| setpoint.feedforward_active));
-        if active.len() % 4096 == 0 {
+        if active.len().is_multiple_of(4096) {
             tell(active.len() as f64 * period_s);
         }
     }
-    if let Some(alarm) = kernel.take_findings().alarm {
+    let findings = kernel.take_findings();
+    if let Some(alarm) = findings.alarm {
         return Err(alarm);
     }
     let axes = machine
@@ -128,6 +131,7 @@ pub fn course_of_program(
         validates,
         measured: false,
         duration_s: postures.len().saturating_sub(1) as f64 * period_s,
+        warnings: findings.warnings,
         axes,
         postures,
         active,
@@ -151,7 +155,7 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
     let end_s = spans().map(|span| span.1).fold(f64::INFINITY, f64::min);
     let period_s = machine.cycle.time_base.setpoint_period_s();
     let steps = ((end_s - start_s).min(COURSE_MAX_S) / period_s + 1e-6).floor();
-    if found.is_empty() || !(steps >= 1.0) {
+    if found.is_empty() || steps.is_nan() || steps < 1.0 {
         let message =
             format!("`{}` holds no position set-points of the axes of this machine in one stretch", trace.name);
         let help = "record position set-point and control deviation (or actual position) of each axis; --axis-name 7=A names axes";
@@ -196,7 +200,16 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
     };
     let postures = (0..rows).map(posture).collect();
     let (name, active) = (trace.name.clone(), vec![true; rows]);
-    Ok(Course { name, validates, measured: true, duration_s: steps * period_s, axes, postures, active })
+    Ok(Course {
+        name,
+        validates,
+        measured: true,
+        duration_s: steps * period_s,
+        warnings: Vec::new(),
+        axes,
+        postures,
+        active,
+    })
 }
 
 fn resampled(signal: &Signal, times: &[f64], kind: AxisKind, name: &str) -> Result<Vec<f64>, Diagnostic> {

@@ -2,7 +2,7 @@
 //!
 //! In: machine, courses, options. Out: [`Tuned`]. Under the contour objective the axes that move the tool in one course are one group with one
 //! delay; else every axis is its own group. New gains are taken only if they are better on the courses for tuning by more than chance: a paired
-//! look at blocks of [`BLOCK_S`] decides, so that tuning does not chase single friction events.
+//! look at blocks of [`BLOCK_S`] decides, and 2 % are the least, so that tuning does not chase single friction events.
 
 use super::contour::{Tool, moves_tool};
 use super::course::Course;
@@ -20,6 +20,8 @@ use crate::machine::{DriveData, Machine};
 pub(super) const BLOCK_S: f64 = 0.25;
 /// Improvement in standard errors of its mean over blocks that is not chance.
 const CERTAIN_ERRORS: f64 = 1.65;
+/// A smaller improvement of the RMS is not worth a change: it is lost on the next program.
+const WORTH_RATIO: f64 = 0.98;
 
 /// What came of it.
 #[derive(Clone, Debug)]
@@ -277,7 +279,8 @@ impl Group<'_> {
         let count = differences.len().max(2) as f64;
         let mean = differences.iter().sum::<f64>() / count;
         let variance = differences.iter().map(|one| (one - mean) * (one - mean)).sum::<f64>() / (count - 1.0);
-        scores[1].mean_square < scores[0].mean_square && mean > CERTAIN_ERRORS * (variance / count).sqrt()
+        scores[1].mean_square < WORTH_RATIO * WORTH_RATIO * scores[0].mean_square
+            && mean > CERTAIN_ERRORS * (variance / count).sqrt()
     }
 
     /// New gains, and how certain they are.
@@ -321,6 +324,9 @@ pub fn tune(
     let tool = Tool::new(machine);
     let paths_mm: Vec<Vec<[f64; 3]>> = courses.iter().map(|course| tool.path_mm(course)).collect();
     let (mut warnings, mut axes, mut landscapes, mut simulations) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for course in &courses {
+        warnings.extend(course.warnings.iter().cloned());
+    }
     let mut after: Vec<(AxisId, Gains)> = Vec::new();
     let groups = groups(machine, &courses[..training], options)?;
     for (number, members) in groups.iter().enumerate() {
@@ -401,7 +407,11 @@ fn group<'a>(
             let data = axis.drive.clone()?;
             let idle = |gain: &Gain| *gain == Gain::Torque && data.feedforward_inertia_kg_m2 == 0.0;
             let free = Gain::ALL.into_iter().filter(|gain| options.gains.contains(gain) && !idle(gain));
-            let ranges = free.map(|gain| (gain, range(options, gain, axis, &data))).collect();
+            // Without friction there is nothing to compensate.
+            let ranges = free
+                .map(|gain| (gain, range(options, gain, axis, &data)))
+                .filter(|(_, range)| range[1] > range[0])
+                .collect();
             Some(Member { axis: *id, data, ranges })
         })
         .collect();

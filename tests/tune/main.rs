@@ -36,11 +36,11 @@ fn gain(tuned: &Tuned, axis: &str, gain: Gain) -> f64 {
     axis.gains.iter().find(|found| found.gain == gain).unwrap().value
 }
 
-/// Arcs, lines and corners in X and Y, some 1.5 s; the seed decides.
+/// Arcs, lines and corners in X and Y, about 1 s; the seed decides.
 fn random_program(seed: u64) -> String {
     let mut random = Random::new(seed);
     let mut text = "G17 G71 G90 G642 CTOL=0.02 SOFT\n".to_owned();
-    for _ in 0..4 {
+    for _ in 0..3 {
         let feed = random.between(1500.0, 9000.0);
         let radius = random.between(4.0, 15.0);
         let (x, y) = (random.between(-12.0, 12.0), random.between(-12.0, 12.0));
@@ -62,12 +62,24 @@ fn without_friction_the_delay_is_that_of_the_closed_form() {
     let found = tuned(&loaded, vec![course(&loaded, "ramps.mpf", text, false)], &options);
     let wanted_ms = 1.0 - 0.125 / 2.0 + 0.010 * 10.0 / 2.0;
     let delay_ms = gain(&found, "X", Gain::Delay);
-    assert!((delay_ms - wanted_ms).abs() < 0.02, "{delay_ms} ms, wanted {wanted_ms} ms");
+    // Where the acceleration steps the formula does not hold: some tenth of the time.
+    assert!((delay_ms - wanted_ms).abs() < 0.12, "{delay_ms} ms, wanted {wanted_ms} ms");
     let of_axis = &found.axes[0].gains[0];
-    assert!(
-        of_axis.low <= wanted_ms + 0.02 && wanted_ms - 0.02 <= of_axis.high && of_axis.high - of_axis.low < 0.2,
-        "{of_axis:?}"
-    );
+    assert!(of_axis.low <= delay_ms && delay_ms <= of_axis.high && of_axis.high - of_axis.low < 0.3, "{of_axis:?}");
+    // And no delay of a fine scan through the drive alone is better.
+    let x = loaded.machine.axis_by_name("X").unwrap();
+    let positions = setpoints(&loaded, text, x);
+    let scan = (900..1200).step_by(20).map(|delay_us| {
+        let mut axis = loaded.machine.axis(x).clone();
+        axis.drive.as_mut().unwrap().setpoint_delay_s = f64::from(delay_us) * 1e-6;
+        let mut drive = AxisDrive::new(&axis, &loaded.machine.cycle.time_base, Start::Held, positions[0]).unwrap();
+        let input =
+            |position: &f64| DriveInput { position_setpoint_lu: *position, load_n_m: 0.0, feedforward_active: true };
+        rms(&positions.iter().map(|position| drive.step(input(position)).control_deviation_lu).collect::<Vec<_>>())
+    });
+    let best_mm = scan.fold(f64::INFINITY, f64::min);
+    let reached_mm = found.courses[0].axes[0].deviation[1].rms;
+    assert!(reached_mm <= 1.001 * best_mm, "{reached_mm} mm, scan {best_mm} mm");
     // The floor is what is reached: there is no friction to take away.
     let figures = &found.courses[0].objective;
     assert!((figures[1].rms - figures[2].rms).abs() < 1e-9 && figures[1].rms < figures[0].rms);
@@ -274,6 +286,16 @@ fn on_another_plant_than_the_model_tuning_still_helps() {
             assert!(new < 0.8 * old, "{new} mm after, {old} mm before, gains {after:?}, measured {is_measured}");
         }
     }
+}
+
+#[test]
+fn a_path_that_turns_back_close_to_itself_is_not_followed_backwards() {
+    // Two circles that touch where they begin, driven in opposite senses: behind the turn the old circle is as near as the new one.
+    let loaded = machine(&[]);
+    let text = "G17 G642 CTOL=0.02\nG91\nG2 X0 Y0 I12 J0 F5000\nG3 X0 Y0 I14 J0\nM30\n";
+    let found = tuned(&loaded, vec![course(&loaded, "t.mpf", text, false)], &TuneOptions::default());
+    let contour = found.courses[0].contour_mm;
+    assert!(contour[0].peak < 0.05 && contour[1].peak < 0.05, "{contour:?}");
 }
 
 #[test]
