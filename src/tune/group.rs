@@ -2,7 +2,7 @@
 //!
 //! In: machine, courses, options. Out: [`Tuned`]. Under the contour objective the axes that move the tool in one course are one group with one
 //! delay; else every axis is its own group. New gains are taken only if they are better on the courses for tuning by more than chance: a paired
-//! look at blocks of [`BLOCK_S`] decides, and 2 % are the least, so that tuning does not chase single friction events.
+//! look at blocks of [`BLOCK_S`] decides, and 2 % (contour: 10 %) are the least, so that tuning does not chase single friction events.
 
 use super::contour::{Tool, moves_tool};
 use super::course::Course;
@@ -20,8 +20,10 @@ use crate::machine::{DriveData, Machine};
 pub(super) const BLOCK_S: f64 = 0.25;
 /// Improvement in standard errors of its mean over blocks that is not chance.
 const CERTAIN_ERRORS: f64 = 1.65;
-/// A smaller improvement of the RMS is not worth a change: it is lost on the next program.
+/// RMS after over before above which a change is not worth it: it is lost on the next program. Most of a contour error is what friction does at
+/// reversals: an improvement there of less than a tenth has made other programs worse.
 const WORTH_RATIO: f64 = 0.98;
+const WORTH_CONTOUR_RATIO: f64 = 0.9;
 
 /// What came of it.
 #[derive(Clone, Debug)]
@@ -268,6 +270,7 @@ impl Group<'_> {
         if self.measure == Measure::Peak {
             return self.figure(&scores[1]) < self.figure(&scores[0]);
         }
+        let worth = if self.objective == Objective::Contour { WORTH_CONTOUR_RATIO } else { WORTH_RATIO };
         let mut differences = Vec::new();
         for course in &residuals {
             let block = ((BLOCK_S / course[0].period_s) as usize).max(1) * course[0].components;
@@ -279,7 +282,7 @@ impl Group<'_> {
         let count = differences.len().max(2) as f64;
         let mean = differences.iter().sum::<f64>() / count;
         let variance = differences.iter().map(|one| (one - mean) * (one - mean)).sum::<f64>() / (count - 1.0);
-        scores[1].mean_square < WORTH_RATIO * WORTH_RATIO * scores[0].mean_square
+        scores[1].mean_square < worth * worth * scores[0].mean_square
             && mean > CERTAIN_ERRORS * (variance / count).sqrt()
     }
 
@@ -340,7 +343,7 @@ pub fn tune(
         let (gains, certainty, kept) = group.tuned();
         if kept {
             let message = format!(
-                "{}: no gains are better than those of the machine by more than chance: kept",
+                "{}: no gains are better than those of the machine by more than chance, and by enough to last: kept",
                 names.join(", ")
             );
             warnings.push(Diagnostic::note("U0003", message));
