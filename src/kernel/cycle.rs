@@ -374,7 +374,7 @@ impl<S: PieceSource> Kernel<S> {
 
     /// The drives, for [`braking`](super::braking).
     pub(super) fn drives_mut(&mut self) -> &mut [Drive] {
-        &mut self.drives
+        self.drives.drives_mut()
     }
 
     /// Ticks between rows.
