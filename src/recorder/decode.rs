@@ -76,6 +76,12 @@ impl AxisSample {
     pub(super) fn decode(mut data: &[u8]) -> Result<Self, prost::DecodeError> {
         let mut sample = Self { values: [0.0; AXIS_FIELD_COUNT], present: 0 };
         while !data.is_empty() {
+            if let Some((field, value, rest)) = double_field(data) {
+                sample.values[field] = value;
+                sample.present |= 1 << field;
+                data = rest;
+                continue;
+            }
             let (tag, wire) = decode_key(&mut data)?;
             let field = tag as usize - 1;
             let value = match (field, wire) {
@@ -83,13 +89,6 @@ impl AxisSample {
                     let mut bits = 0_u32;
                     prost::encoding::uint32::merge(wire, &mut bits, &mut data, DecodeContext::default())?;
                     f64::from(bits)
-                }
-                (field, WireType::SixtyFourBit)
-                    if field < AXIS_FIELD_COUNT && !matches!(field, FLAGS_FIELD | MONITORING_FIELD) =>
-                {
-                    let mut value = 0.0;
-                    prost::encoding::double::merge(wire, &mut value, &mut data, DecodeContext::default())?;
-                    value
                 }
                 _ => {
                     skip_field(wire, tag, &mut data, DecodeContext::default())?;
@@ -101,6 +100,22 @@ impl AxisSample {
         }
         Ok(sample)
     }
+}
+
+/// A field of wire type 1 that this program writes, at the beginning of `data`: its place, its value, what follows. In one piece: this is most of
+/// what a recording is made of. `None`: anything else, or too few bytes, which the general way tells.
+#[inline]
+fn double_field(data: &[u8]) -> Option<(usize, f64, &[u8])> {
+    let (first, rest) = data.split_first()?;
+    let (key, rest) = match (*first, rest) {
+        (low @ 0..=0x7f, rest) => (u32::from(low), rest),
+        (low, [high @ 0..=0x7f, rest @ ..]) => (u32::from(low & 0x7f) | u32::from(*high) << 7, rest),
+        _ => return None,
+    };
+    let field = (key >> 3).checked_sub(1)? as usize;
+    let known = key & 7 == 1 && field < AXIS_FIELD_COUNT && !matches!(field, FLAGS_FIELD | MONITORING_FIELD);
+    let (bytes, rest) = rest.split_first_chunk().filter(|_| known)?;
+    Some((field, f64::from_le_bytes(*bytes), rest))
 }
 
 /// A decoded message.

@@ -61,18 +61,17 @@ impl Recorder {
             let message = format!("--record-precision {bits} is out of range: an f64 has 52 mantissa bits");
             return Err(Diagnostic::error("R0021", message).help("give 1 to 52; 36 keep 7e-9 mm in 1000 mm"));
         }
-        let writer = RecordingWriter::create(target, name.clone(), setup)?;
+        let fault: Fault = Arc::new(OnceLock::new());
+        let writer = RecordingWriter::create(target, name.clone(), setup, fault.clone())?;
         let (orders, orders_out) = bounded(BATCHES);
         let (returned_in, returned) = bounded(BATCHES);
         for _ in 1..BATCHES {
             // Never full: it holds all batches there are.
             let _ = returned_in.try_send(Batch::empty());
         }
-        let fault: Fault = Arc::new(OnceLock::new());
-        let thread_fault = fault.clone();
         let thread = std::thread::Builder::new()
             .name("recorder".to_owned())
-            .spawn(move || writer.run(&orders_out, &returned_in, &thread_fault))
+            .spawn(move || writer.run(&orders_out, &returned_in))
             .map_err(|error| Diagnostic::error("R0002", format!("the recorder's thread does not start: {error}")))?;
         let signals = setup.signals.on(setup.machine);
         let time_base = setup.machine.cycle.time_base;
