@@ -13,6 +13,10 @@ mod explain;
 mod export;
 mod failure;
 mod follow;
+mod identify;
+mod identify_control;
+mod identify_page;
+mod identify_tables;
 mod inputs;
 mod machine;
 mod machine_data;
@@ -67,6 +71,8 @@ enum Command {
     Follow(follow::FollowArguments),
     /// Two traces, aligned: figures per signal, contour error, circles, corners; limits decide the exit code
     Compare(compare::CompareArguments),
+    /// Traces of a machine: friction, inertia, feed-forward, delays, gains of its drives, with confidence
+    Identify(identify::IdentifyArguments),
     /// A trace as a page to look at: plots, path, tables, program
     Report(report::ReportArguments),
     /// Feed-forward gains and their delay, from programs or measured traces
@@ -96,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Moves(arguments) => (moves::moves(arguments), arguments.json),
         Command::Follow(arguments) => (follow::follow(arguments), arguments.json),
         Command::Compare(arguments) => (compare::compare(arguments), arguments.json),
+        Command::Identify(arguments) => (identify::identify(arguments), arguments.json),
         Command::Report(arguments) => (report::report(arguments), arguments.json),
         Command::Tune(arguments) => (tune::tune(arguments), arguments.json),
         Command::Export(arguments) => (export::export(arguments), arguments.json),

@@ -5,6 +5,8 @@
 //! recording around it. Does not print.
 
 mod alarms;
+mod braking;
+mod clamping;
 mod contour_error;
 mod cycle;
 mod figures;
@@ -19,6 +21,7 @@ mod summary;
 mod threads;
 mod what_if;
 
+pub use braking::Braking;
 pub use cycle::{AxisRow, CycleOutput, Kernel, Status};
 pub use figures::Figures;
 pub use follow::{FollowOptions, FollowOutcome, follow};

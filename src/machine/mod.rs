@@ -34,7 +34,8 @@ pub use catalogue::tables;
 pub use checked::*;
 pub use choices::Choice;
 pub use drive_options::{
-    Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, JerkFilter, JerkFilterKind, PositionSource,
+    Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, FrictionAdaptation, JerkFilter, JerkFilterKind,
+    PositionSource,
 };
 pub use error_table::ErrorTable;
 pub use keys::{Absent, Accepts, Key, MotorKind, Range, TableKeys};
