@@ -295,7 +295,13 @@ impl Group<'_> {
         let best = ends.into_iter().min_by(|one, other| self.figure(&one.1).total_cmp(&self.figure(&other.1)));
         let found = best.map_or_else(|| before.clone(), |(gains, score)| search(self, gains, score));
         let found = self.rounded(&found);
-        let kept = !self.better(&before, &found);
+        // A common delay that the paths do not tell runs along the ridge of 7.3, and is wrong on the next program.
+        let untold = self.objective == Objective::Contour
+            && certainty(self, &found, &theory)
+                .iter()
+                .zip(&self.slots)
+                .any(|(certainty, slot)| slot.gain == Gain::Delay && !certainty.certain);
+        let kept = untold || !self.better(&before, &found);
         let gains = if kept { before } else { found };
         let certainty = certainty(self, &gains, &theory);
         (gains, certainty, kept)
@@ -343,7 +349,7 @@ pub fn tune(
         let (gains, certainty, kept) = group.tuned();
         if kept {
             let message = format!(
-                "{}: no gains are better than those of the machine by more than chance, and by enough to last: kept",
+                "{}: no gains are better than those of the machine by more than chance, and by enough to last, or the courses do not tell the delay: kept",
                 names.join(", ")
             );
             warnings.push(Diagnostic::note("U0003", message));
