@@ -277,7 +277,7 @@ fn run<const N: usize>(laws: &Laws<N>, held: &Held<N>, state: &mut State<N>, cyc
 #[inline(always)]
 fn speed_control<const N: usize>(laws: &Laws<N>, held: &Held<N>, now: &mut State<N>) -> Lanes<N> {
     let mut current_reference_a = [0.0; N];
-    for (lane, reference_a) in current_reference_a.iter_mut().enumerate() {
+    for lane in 0..N {
         let speed = &laws.speed;
         let mut law = SpeedLaw {
             gain_n_m_s_per_rad: speed.gain_n_m_s_per_rad[lane],
@@ -289,7 +289,7 @@ fn speed_control<const N: usize>(laws: &Laws<N>, held: &Held<N>, now: &mut State
         let error_rad_s = held.speed_reference_rad_s[lane] - now.speed_rad_s[lane];
         let (torque_n_m, _) = law.step(error_rad_s, error_rad_s, held.torque_feedforward_n_m[lane]);
         now.speed_integral_n_m[lane] = law.integral_n_m;
-        *reference_a = torque_n_m / speed.torque_constant_n_m_per_a[lane];
+        current_reference_a[lane] = torque_n_m / speed.torque_constant_n_m_per_a[lane];
     }
     current_reference_a
 }
@@ -303,10 +303,10 @@ fn current_cycle<const N: usize>(
     now: &mut State<N>,
     seen: &mut Seen<N>,
 ) {
-    for (lane, reference_a) in current_reference_a.iter().enumerate() {
+    for lane in 0..N {
         let mut law = laws.current.law(lane, now.current_integral_v[lane]);
         let before = now.plant(lane);
-        let voltage_v = law.step(reference_a - before.current_a).voltage_v;
+        let voltage_v = law.step(current_reference_a[lane] - before.current_a).voltage_v;
         now.current_integral_v[lane] = law.integral_v;
         now.current_sum_a[lane] += before.current_a;
         let excess = laws.slopes(lane).excess(before, voltage_v, seen.against_n_m[lane]);
@@ -355,7 +355,7 @@ impl<const N: usize> Seen<N> {
     #[inline(always)]
     fn happened(&self, laws: &Laws<N>, now: &State<N>) -> Lanes<N> {
         let mut happened = [0.0; N];
-        for (lane, happened) in happened.iter_mut().enumerate() {
+        for lane in 0..N {
             let (end, watch) = (now.plant(lane), &laws.watch);
             let torque_n_m = laws.slopes(lane).excess(end, 0.0, self.against_n_m[lane]).torque_n_m;
             let torque_n_m = larger(self.torque_max_n_m[lane], torque_n_m.abs());
@@ -364,7 +364,7 @@ impl<const N: usize> Seen<N> {
             let goes_on = (self.slowest_rad_s[lane] >= enough_rad_s)
                 & (end.speed_rad_s * self.side[lane] >= enough_rad_s)
                 & (torque_n_m <= watch.hold_n_m[lane]);
-            *happened = if goes_on { 0.0 } else { 1.0 };
+            happened[lane] = if goes_on { 0.0 } else { 1.0 };
         }
         happened
     }
