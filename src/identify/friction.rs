@@ -106,7 +106,15 @@ fn covered(motions: &[Motion]) -> Covered {
     let speed_max_rad_s = motions.iter().map(|motion| motion.speed_max_rad_s).fold(0.0, f64::max);
     let seconds = |motion: &Motion| motion.moves.iter().filter(|moves| **moves).count() as f64 * motion.period_s;
     let block_s = (motions.iter().map(seconds).sum::<f64>() / BLOCKS).clamp(BLOCK_S.0, BLOCK_S.1);
-    let mut all = Covered { blocks: Blocks::new(WIDTH), torque_max_n_m: 0.0, direction_s: [0.0; 2], range_lu: 0.0 };
+    let mut all = Covered {
+        blocks: Blocks::new(WIDTH),
+        torque_max_n_m: 0.0,
+        direction_s: [0.0; 2],
+        range_lu: 0.0,
+        constant: [0.0; 3],
+    };
+    let accelerations = motions.iter().flat_map(|motion| &motion.acceleration_rad_s2).filter(|a| a.is_finite());
+    let acceleration_max_rad_s2 = accelerations.fold(0.0_f64, |most, a| most.max(a.abs()));
     let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
     for motion in motions {
         let per_block = ((block_s / motion.period_s).round() as usize).max(1);
