@@ -106,5 +106,6 @@ pub mod kernel;
 pub mod trace;
 pub mod compare;
 pub mod identify;
+pub mod tune;
 pub mod report;
 pub mod cli;

@@ -130,6 +130,7 @@ impl TraceNames {
             signal_map: self.signal_map.iter().map(|text| map_row(text)).collect::<Result<_, _>>()?,
             time_column: self.time_column.clone(),
             only: only.to_vec(),
+            programmed: false,
             progress: Progress(Some(&tell)),
         })
     }
@@ -277,6 +278,8 @@ pub(super) const SHIPPED_PROGRAMS: &[(&str, &str)] = &[
     ("corners.mpf", include_str!("../../programs/corners.mpf")),
     ("pocket.mpf", include_str!("../../programs/pocket.mpf")),
     ("spline.mpf", include_str!("../../programs/spline.mpf")),
+    ("tapping.mpf", include_str!("../../programs/tapping.mpf")),
+    ("thread.mpf", include_str!("../../programs/thread.mpf")),
 ];
 
 /// Opens a program, or a shipped one by its name where no file of that name exists.

@@ -19,6 +19,7 @@ mod identify_page;
 mod identify_tables;
 mod inputs;
 mod machine;
+mod machine_data;
 mod moves;
 mod output;
 mod recorded;
@@ -26,6 +27,9 @@ mod recover;
 mod report;
 mod run;
 mod time;
+mod tune;
+mod tune_page;
+mod tune_tables;
 mod what_if;
 
 use clap::{Parser, Subcommand};
@@ -71,11 +75,13 @@ enum Command {
     Identify(identify::IdentifyArguments),
     /// A trace as a page to look at: plots, path, tables, program
     Report(report::ReportArguments),
+    /// Feed-forward gains and their delay, from programs or measured traces
+    Tune(tune::TuneArguments),
     /// A recording as CSV
     Export(export::ExportArguments),
     /// Rescue what an interrupted run left
     Recover(recover::RecoverArguments),
-    /// Machine files: check, list, show, schema, frequency responses
+    /// Machine files: check, list, show, schema, frequency responses; SINUMERIK machine data in and out
     Machine(machine::MachineArguments),
     /// What a code such as E0104 means, and what to do
     Explain(explain::ExplainArguments),
@@ -98,6 +104,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => (compare::compare(arguments), arguments.json),
         Command::Identify(arguments) => (identify::identify(arguments), arguments.json),
         Command::Report(arguments) => (report::report(arguments), arguments.json),
+        Command::Tune(arguments) => (tune::tune(arguments), arguments.json),
         Command::Export(arguments) => (export::export(arguments), arguments.json),
         Command::Recover(arguments) => (recover::recover(arguments), arguments.json),
         Command::Machine(arguments) => (machine::machine(arguments), arguments.json()),

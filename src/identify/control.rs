@@ -411,13 +411,16 @@ fn agreement(planned: &PathProfile, target: &PathProfile) -> Agreement {
     }
 }
 
+/// A machine, and what was found for it.
+type Tried = (Machine, Vec<(Knob, f64)>);
+
 /// Tries every time law and blend law, and keeps the best in `fit`: key, word, and the word of the file.
 fn best_choice(
     fit: &mut Fit<'_>,
     machine: &Machine,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Vec<(&'static str, String, String)>, Diagnostic> {
-    let mut best: Option<(f64, Machine, Vec<(Knob, f64)>)> = None;
+    let mut best: Option<(f64, Tried)> = None;
     for time_law in [TimeLawKind::SevenPhase, TimeLawKind::Continuous] {
         for blend_law in [BlendLaw::Limits, BlendLaw::Entry] {
             progress(&format!("{}, blend law {}", time_law.word(), blend_law.word()));
@@ -429,13 +432,13 @@ fn best_choice(
             let done = one.run(&TIME, false, PASSES.0);
             fit.plans = one.plans;
             if let Some((cost, ..)) = done
-                && best.as_ref().is_none_or(|(least, ..)| cost < *least)
+                && best.as_ref().is_none_or(|(least, _)| cost < *least)
             {
-                best = Some((cost, one.machine, one.values));
+                best = Some((cost, (one.machine, one.values)));
             }
         }
     }
-    let (_, chosen, values) = best.ok_or_else(|| refused("no time law drives this program without an alarm"))?;
+    let (_, (chosen, values)) = best.ok_or_else(|| refused("no time law drives this program without an alarm"))?;
     let words = vec![
         ("feed.time_law", chosen.feed.time_law.word().to_owned(), machine.feed.time_law.word().to_owned()),
         (

@@ -5,9 +5,11 @@
 use super::event::EventRecord;
 use super::schema::ToolPose;
 use crate::base::{AxisId, Tick};
-use crate::drive::AxisSignals;
+use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
+use crate::interpreter::ProgrammedBlock;
 use crate::program::{BlockRef, OpenedProgram};
+use std::sync::Arc;
 
 /// Records in a batch: about two simulated centiseconds of five axes at 1 kHz, so that the channel is touched seldom.
 pub(super) const BATCH_RECORDS: usize = 512;
@@ -30,6 +32,10 @@ pub(super) enum Record {
         sample: PathSample,
         contour_error_mm: Option<f64>,
     },
+    Spindle {
+        tick: Tick,
+        signals: SpindleSignals,
+    },
     Pose {
         tick: Tick,
         which: ToolPose,
@@ -40,6 +46,10 @@ pub(super) enum Record {
         tick: Tick,
         block: Option<BlockRef>,
         event: EventRecord,
+    },
+    Programmed {
+        tick: Tick,
+        block: Arc<ProgrammedBlock>,
     },
     Program {
         tick: Tick,
@@ -52,8 +62,10 @@ impl Record {
         match self {
             Self::Axis { tick, .. }
             | Self::Path { tick, .. }
+            | Self::Spindle { tick, .. }
             | Self::Pose { tick, .. }
             | Self::Event { tick, .. }
+            | Self::Programmed { tick, .. }
             | Self::Program { tick, .. } => *tick,
         }
     }

@@ -11,7 +11,7 @@ use super::target::Target;
 use super::writer::{Fault, RecordingSummary, RecordingWriter, write_fault};
 use crate::base::units::NS_PER_S;
 use crate::base::{AXES_MAX, AxisId, Diagnostic, PerAxis, Tick, TimeBase};
-use crate::drive::AxisSignals;
+use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
 use crate::interpreter::Event;
 use crate::program::{BlockRef, OpenedProgram, ProgramId};
@@ -41,6 +41,7 @@ pub struct Recorder {
     attached: Vec<ProgramId>,
     axis_decimators: PerAxis<AxisDecimator>,
     path_decimator: Decimator,
+    spindle_decimator: Decimator,
 }
 
 impl Recorder {
@@ -61,18 +62,17 @@ impl Recorder {
             let message = format!("--record-precision {bits} is out of range: an f64 has 52 mantissa bits");
             return Err(Diagnostic::error("R0021", message).help("give 1 to 52; 36 keep 7e-9 mm in 1000 mm"));
         }
-        let writer = RecordingWriter::create(target, name.clone(), setup)?;
+        let fault: Fault = Arc::new(OnceLock::new());
+        let writer = RecordingWriter::create(target, name.clone(), setup, fault.clone())?;
         let (orders, orders_out) = bounded(BATCHES);
         let (returned_in, returned) = bounded(BATCHES);
         for _ in 1..BATCHES {
             // Never full: it holds all batches there are.
             let _ = returned_in.try_send(Batch::empty());
         }
-        let fault: Fault = Arc::new(OnceLock::new());
-        let thread_fault = fault.clone();
         let thread = std::thread::Builder::new()
             .name("recorder".to_owned())
-            .spawn(move || writer.run(&orders_out, &returned_in, &thread_fault))
+            .spawn(move || writer.run(&orders_out, &returned_in))
             .map_err(|error| Diagnostic::error("R0002", format!("the recorder's thread does not start: {error}")))?;
         let signals = setup.signals.on(setup.machine);
         let time_base = setup.machine.cycle.time_base;
@@ -90,6 +90,7 @@ impl Recorder {
             attached: setup.programs.iter().map(|program| program.id).collect(),
             axis_decimators: PerAxis::from_fn(|axis| AxisDecimator::new(&signals.groups(axis), every)),
             path_decimator: Decimator::new(every),
+            spindle_decimator: Decimator::new(every),
         })
     }
 
@@ -108,6 +109,13 @@ impl Recorder {
     pub fn path(&mut self, tick: Tick, sample: &PathSample, contour_error_mm: Option<f64>) {
         let record = Record::Path { tick, sample: *sample, contour_error_mm };
         if let Some(record) = self.path_decimator.pass(record) {
+            self.push(record);
+        }
+    }
+
+    /// The master spindle at a set-point; recorded where the machine file has one.
+    pub fn spindle(&mut self, tick: Tick, signals: &SpindleSignals) {
+        if let Some(record) = self.spindle_decimator.pass(Record::Spindle { tick, signals: *signals }) {
             self.push(record);
         }
     }
@@ -131,8 +139,11 @@ impl Recorder {
         if let Event::ProgramOpened(program) = event {
             self.attach_program(tick, program);
         }
-        if !matches!(event, Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_)) {
-            self.event(tick, Some(block), event.into());
+        match event {
+            Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {}
+            Event::SpindlePosition(positioning) if positioning.text.is_empty() => {}
+            _ => self.event(tick, Some(block), event.into()),
         }
     }
 
@@ -154,6 +165,7 @@ impl Recorder {
         let axes = AxisId::first(AXES_MAX);
         let mut last: Vec<Record> = axes.filter_map(|axis| self.axis_decimators[axis].rest(axis)).collect();
         last.extend(self.path_decimator.rest());
+        last.extend(self.spindle_decimator.rest());
         last.sort_by_key(Record::tick);
         for record in last {
             self.push(record);
