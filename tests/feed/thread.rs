@@ -188,7 +188,8 @@ fn tapping_turns_the_spindle_with_the_axis_and_back() {
             assert!((time(3) - time(4)).abs() < 1.5e-3, "{} {}", time(3), time(4));
             assert!((rows[rows.len() - 1].angle - TAU / 12.0).abs() < 1e-9, "{:?}", rows.last());
             let lowest = cut.iter().map(|row| row.z[0]).fold(f64::INFINITY, f64::min);
-            assert!((lowest + 15.0).abs() < 1e-9);
+            // It turns back between two set-points, at 12.5 mm/s².
+            assert!(lowest >= -15.0 - 1e-9 && lowest < -15.0 + 1e-5, "{lowest}");
         }
     }
 }
@@ -265,7 +266,7 @@ fn a_speed_that_an_axis_cannot_follow_is_an_alarm_with_the_highest_possible_one(
         assert!(said[0].contains("velocity") && (highest(&said[0]) - 3750.0).abs() < 0.11, "{said:?}");
     }
     // 2 mm/rev² at S at most sqrt(800 / 2) rev/s = 1200 rpm; both are then possible.
-    let (_, said) = replay(&machine, "M3 S1400\nG34 Z-200 K2 F2\nM30\n", false);
+    let (_, said) = replay(&machine, "M3 S1400\nG34 Z-10 K2 F2\nM30\n", false);
     assert!(said[0].contains("acceleration") && (highest(&said[0]) - 1200.0).abs() < 0.11, "{said:?}");
     let (_, said) = replay(&machine, "M3 S3750\nG33 Z-400 K4\nM30\n", false);
     assert_eq!(said, Vec::<String>::new());
