@@ -40,7 +40,7 @@ fn drives(criterion: &mut Criterion) {
         ("1 axis moving", 1_u32, 0.0, false),
         ("1 axis standing", 1, 0.0, true),
         ("1 axis moving, gravity with the angle", 1, 1.0, false),
-        ("3 axes interleaved", 3, 0.0, false),
+        ("3 axes one after the other", 3, 0.0, false),
     ] {
         let (axis, time_base) = axis(gravity_sin_n_m);
         let inputs: Vec<Vec<DriveInput>> = (0..count)
@@ -65,6 +65,41 @@ fn drives(criterion: &mut Criterion) {
                         }
                     }
                     drives
+                },
+                criterion::BatchSize::SmallInput,
+            );
+        });
+    }
+    group.finish();
+}
+
+/// The axes of a machine as the kernel steps them.
+fn machine(criterion: &mut Criterion) {
+    let (axis, time_base) = axis(0.0);
+    let mut group = criterion.benchmark_group("axis current-steps");
+    for count in [3_u32, 5] {
+        let inputs: Vec<Vec<DriveInput>> = (0..count).map(|i| setpoints(f64::from(i))).collect();
+        let drives: Vec<AxisDrive> = inputs
+            .iter()
+            .filter_map(|inputs| AxisDrive::new(&axis, &time_base, Start::Held, inputs[0].position_setpoint_lu))
+            .collect();
+        group.throughput(Throughput::Elements(
+            drives.iter().map(|drive| u64::from(drive.ticks_per_step() * CYCLES)).sum(),
+        ));
+        let start = DriveBatch::new(drives);
+        group.bench_function(BenchmarkId::from_parameter(format!("{count} axes of a machine")), |bencher| {
+            bencher.iter_batched(
+                || start.clone(),
+                |mut batch| {
+                    for k in 0..CYCLES as usize {
+                        batch.step_some(
+                            |place| Some(inputs[place][k]),
+                            |_, signals| {
+                                black_box(signals);
+                            },
+                        );
+                    }
+                    batch
                 },
                 criterion::BatchSize::SmallInput,
             );
@@ -109,5 +144,5 @@ fn batch(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, drives, batch);
+criterion_group!(benches, drives, machine, batch);
 criterion_main!(benches);

@@ -69,6 +69,30 @@ pub fn interpreter(bytes: &[u8]) {
     interpreter.take_warnings().iter().for_each(|warning| assert!(!warning.render(false).is_empty()));
 }
 
+/// Two traces in one input, the second behind a line of `%%%%`: they are compared, with budget and drift, and drawn.
+#[allow(dead_code, reason = "tests/fuzz_corpus.rs has programs only")]
+pub fn compare(bytes: &[u8]) {
+    use sollwert::compare::{CompareOptions, document, prepare};
+    const BORDER: &[u8] = b"\n%%%%\n";
+    let border = bytes.windows(BORDER.len()).position(|window| window == BORDER);
+    let parts = border.map_or([bytes, bytes], |at| [&bytes[..at], &bytes[at + BORDER.len()..]]);
+    let path = |end: &str| std::env::temp_dir().join(format!("sollwert-fuzz-{}.{end}", std::process::id()));
+    let read = |bytes: &[u8]| {
+        std::fs::write(path("pair"), bytes).ok()?;
+        let mut trace = sollwert::trace::import(&path("pair"), &sollwert::trace::ImportOptions::default()).ok()?;
+        prepare(&mut trace);
+        Some(trace)
+    };
+    let [Some(trace), Some(reference)] = parts.map(read) else { return };
+    let options = CompareOptions { budget: true, drift: bytes.len().is_multiple_of(2), ..CompareOptions::default() };
+    if let Ok(comparison) = sollwert::compare::compare(&trace, &reference, &options) {
+        assert!(document(&comparison).is_object());
+        let reference = Some((&reference, &comparison));
+        let sheet = sollwert::report::Sheet { trace: &trace, side: &comparison.sides[0], reference };
+        sollwert::report::write(&sheet, &path("html")).expect("a page");
+    }
+}
+
 /// A trace of any format: it is read or refused, and what is read is in order. The importers read files, so that one is written.
 #[allow(dead_code, reason = "tests/fuzz_corpus.rs has programs only")]
 pub fn trace(bytes: &[u8]) {

@@ -100,7 +100,8 @@ impl Reading {
             let share_percent = percent_from_ratio(done as f64 / total.max(1) as f64);
             line.borrow_mut().update(|| format!("{}: {share_percent:.0} % read", path.display()));
         };
-        let options = ImportOptions { only, progress: Progress(Some(&tell)), ..self.options(machine)? };
+        let options =
+            ImportOptions { only, programmed: true, progress: Progress(Some(&tell)), ..self.options(machine)? };
         let trace = import(path, &options).map_err(Failure::unreadable)?;
         show(&trace.notes);
         Ok(trace)
@@ -123,10 +124,18 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<(), Failure> {
         budget: arguments.budget || arguments.output.is_some(),
     };
     let machine = arguments.reading.machine(&files)?;
-    // Signals that --map names are read whatever else there is.
-    let only = |file| if arguments.maps.is_empty() { signals_of_file(file) } else { Ok(Vec::new()) };
-    let mut trace = arguments.reading.import(files[0], machine.as_ref(), only(files[0])?)?;
-    let mut reference = arguments.reading.import(files[1], machine.as_ref(), only(files[1])?)?;
+    // Of a recording that does not fit into memory, those that --map names are read whatever else there is.
+    let only = |file, mapped: Vec<&String>| -> Result<Vec<String>, Failure> {
+        let mut only = signals_of_file(file)?;
+        if !only.is_empty() {
+            only.extend(mapped.into_iter().cloned());
+        }
+        Ok(only)
+    };
+    let mapped = [options.map.iter().map(|pair| &pair.0).collect(), options.map.iter().map(|pair| &pair.1).collect()];
+    let [of_trace, of_reference] = mapped;
+    let mut trace = arguments.reading.import(files[0], machine.as_ref(), only(files[0], of_trace)?)?;
+    let mut reference = arguments.reading.import(files[1], machine.as_ref(), only(files[1], of_reference)?)?;
     prepare(&mut trace);
     prepare(&mut reference);
     let comparison = compare_traces(&trace, &reference, &options).map_err(Failure::unreadable)?;

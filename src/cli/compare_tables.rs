@@ -3,8 +3,11 @@
 //! In: a [`Comparison`], checked limits. Out: text. Numbers are rounded for reading; `--json` has them whole.
 
 use super::output::table;
-use crate::base::units::{MS_PER_S, UM_PER_MM, US_PER_S};
-use crate::compare::{Comparison, Figures, LimitCheck, Lines, PairFigures, Side};
+use crate::base::units::{MS_PER_S, US_PER_S};
+use crate::compare::{
+    Comparison, Features, Figures, LimitCheck, Lines, PairFigures, Side, arcs_remark, budget_rows, circle_rows,
+    corner_rows, line_rows, pair_rows, significant, um,
+};
 use crate::trace::Trace;
 
 /// Rows of a table of places.
@@ -21,11 +24,11 @@ pub(super) fn tables(comparison: &Comparison, checks: &[LimitCheck], trace: &Tra
     };
     if !comparison.pairs.is_empty() {
         text += "\ndifferences at equal times (trace - reference)\n";
-        text += &table(&figures_rows(&comparison.pairs, |pair| pair.in_time.as_ref(), &at));
+        text += &table(&pair_rows(&comparison.pairs, |pair| pair.in_time.as_ref(), &at));
     }
     if comparison.pairs.iter().any(|pair| pair.along_path.is_some()) {
         text += "\ndifferences at equal places on the path, while the tool moves\n";
-        text += &table(&figures_rows(&comparison.pairs, |pair| pair.along_path.as_ref(), &at));
+        text += &table(&pair_rows(&comparison.pairs, |pair| pair.along_path.as_ref(), &at));
     }
     text += &contour_text(comparison, &at);
     for side in &comparison.sides {
@@ -86,43 +89,9 @@ fn head(comparison: &Comparison) -> Vec<Vec<String>> {
     rows
 }
 
-/// Three significant digits, more where the number is large.
-fn significant(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let digits = (2 - value.abs().log10().floor() as i64).clamp(0, 9) as usize;
-    if value.abs() < 1e-7 { format!("{value:.2e}") } else { format!("{value:.digits$}") }
-}
-
-fn figures_rows(
-    pairs: &[PairFigures],
-    get: impl Fn(&PairFigures) -> Option<&Figures>,
-    at: &dyn Fn(f64) -> String,
-) -> Vec<Vec<String>> {
-    let head = ["", "rms", "max", "at", "p95", "bias", "correlation", "delay", "unit"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for pair in pairs {
-        let Some(figures) = get(pair) else { continue };
-        rows.push(vec![
-            pair.name.clone(),
-            significant(figures.rms),
-            significant(figures.max),
-            at(figures.max_at_s),
-            significant(figures.p95),
-            significant(figures.bias),
-            figures.correlation_ratio.map_or(String::new(), |r| format!("{r:.5}")),
-            pair.delay_s.map_or(String::new(), |(delay_s, _)| format!("{:.3} ms", delay_s * MS_PER_S)),
-            pair.unit.clone(),
-        ]);
-    }
-    rows
-}
-
 fn contour_text(comparison: &Comparison, at: &dyn Fn(f64) -> String) -> String {
     let mut rows = Vec::new();
     let mut push = |name: String, figures: &Figures, place: String| {
-        let um = |value_mm: f64| format!("{} µm", significant(value_mm * UM_PER_MM));
         rows.push(vec![name, um(figures.rms), um(figures.max), place, um(figures.p95), um(figures.bias)]);
     };
     if let Some(found) = &comparison.contour {
@@ -148,41 +117,17 @@ fn contour_text(comparison: &Comparison, at: &dyn Fn(f64) -> String) -> String {
 fn features_text(side: &Side) -> String {
     let Some(own) = &side.own else { return String::new() };
     let mut text = String::new();
-    if !own.features.circles.is_empty() {
-        let head = ["", "R", "G", "G(b)", "F max", "F min", "F mean", "peaks behind 0, 90, 180, 270 deg"];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
-        for circle in own.features.circles.iter().take(ROWS_MAX) {
-            let um = |value_um: f64| format!("{value_um:.2} µm");
-            let way = if circle.counter_clockwise { "ccw" } else { "cw" };
-            let peaks = circle.quadrant_peaks_um.map(|peak| peak.map_or("-".to_owned(), |peak| format!("{peak:.2}")));
-            rows.push(vec![
-                format!("{} {way} at {:.3} s", circle.plane.concat(), circle.start_s),
-                format!("{:.3} mm", circle.radius_mm),
-                um(circle.deviation_um),
-                circle.bidirectional_um.map_or(String::new(), um),
-                um(circle.radial_max_um),
-                um(circle.radial_min_um),
-                um(circle.radial_mean_um),
-                peaks.join(", "),
-            ]);
-        }
-        text +=
-            &format!("\ncircles of {} (ISO 230-4), {} in all\n{}", side.name, own.features.circles.len(), table(&rows));
+    let Features { circles, corners, .. } = &own.features;
+    if !circles.is_empty() {
+        let rows = table(&circle_rows(circles, ROWS_MAX));
+        text += &format!("\ncircles of {} (ISO 230-4), {} in all\n{rows}", side.name, circles.len());
     }
-    let mut worst: Vec<_> = own.features.corners.iter().collect();
-    worst.sort_by(|a, b| b.overshoot_um.total_cmp(&a.overshoot_um).then(a.time_s.total_cmp(&b.time_s)));
-    if !worst.is_empty() {
-        let mut rows = vec![["", "angle", "overshoot", "cut", "at"].map(str::to_owned).to_vec()];
-        for corner in worst.iter().take(ROWS_MAX) {
-            rows.push(vec![
-                format!("{:.3} s", corner.time_s),
-                format!("{:.1} deg", corner.angle_deg),
-                format!("{:.2} µm", corner.overshoot_um),
-                format!("{:.2} µm", corner.cut_um),
-                corner.point_mm.map(|x| format!("{x:.3}")).join(" "),
-            ]);
-        }
-        text += &format!("\ncorners of {} that are overshot most, {} in all\n{}", side.name, worst.len(), table(&rows));
+    if let Some(remark) = arcs_remark(&own.features) {
+        text += &format!("\n{}: {remark}\n", side.name);
+    }
+    if !corners.is_empty() {
+        let rows = table(&corner_rows(corners, ROWS_MAX));
+        text += &format!("\ncorners of {} that are overshot most, {} in all\n{rows}", side.name, corners.len());
     }
     text
 }
@@ -190,18 +135,8 @@ fn features_text(side: &Side) -> String {
 /// Where the error of one side comes from.
 pub(super) fn budget_text(side: &Side) -> String {
     let Some(budget) = &side.budget else { return String::new() };
-    let parts =
-        [("chords of the program", &budget.chord), ("interpolator", &budget.interpolator), ("drives", &budget.drives)];
-    let mut rows = vec![["", "rms", "max", "p95", "worst lines"].map(str::to_owned).to_vec()];
-    for (name, part) in parts {
-        let Some(part) = part else { continue };
-        let um = |value_um: f64| format!("{} µm", significant(value_um));
-        let worst =
-            part.worst.iter().take(4).map(|((_, line), error_um)| format!("{line} ({})", significant(*error_um)));
-        let f = &part.figures;
-        rows.push(vec![name.to_owned(), um(f.rms), um(f.max), um(f.p95), worst.collect::<Vec<_>>().join(", ")]);
-    }
-    let mut text = format!("\nwhere the error of {} comes from\n{}", side.name, table(&rows));
+    let whose = if budget.program_of_other { " (against the program of the other file)" } else { "" };
+    let mut text = format!("\nwhere the error of {} comes from{whose}\n{}", side.name, table(&budget_rows(budget)));
     for note in &budget.missing {
         text += &format!("  {}\n", note.message);
     }
@@ -209,17 +144,7 @@ pub(super) fn budget_text(side: &Side) -> String {
 }
 
 fn lines_text(comparison: &Comparison) -> String {
-    let differing = comparison.lines.iter().filter(|line| (line.trace_s - line.reference_s).abs() > 5e-4);
-    let mut rows = vec![["line", "trace", "reference", "difference", "contour error max"].map(str::to_owned).to_vec()];
-    for line in differing.take(ROWS_MAX) {
-        rows.push(vec![
-            format!("{} {}", line.program, line.line),
-            format!("{:.3} s", line.trace_s),
-            format!("{:.3} s", line.reference_s),
-            format!("{:+.3} s", line.trace_s - line.reference_s),
-            format!("{} µm", significant(line.contour_error_max_mm * UM_PER_MM)),
-        ]);
-    }
+    let rows = line_rows(&comparison.lines, ROWS_MAX);
     if rows.len() == 1 {
         return String::new();
     }

@@ -116,6 +116,7 @@ impl TraceNames {
             signal_map: self.signal_map.iter().map(|text| map_row(text)).collect::<Result<_, _>>()?,
             time_column: self.time_column.clone(),
             only: only.to_vec(),
+            programmed: false,
             progress: Progress(Some(&tell)),
         })
     }

@@ -36,9 +36,10 @@ pub(super) fn report(arguments: &ReportArguments) -> Result<(), Failure> {
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(name).with_extension("html"));
     refuse_same_file([arguments.trace.as_path()], &output)?;
     let only = signals_of_file(&arguments.trace)?;
-    let trace = arguments
-        .reading
-        .with_options(&only, |options| import(&arguments.trace, options).map_err(Failure::unreadable))?;
+    let trace = arguments.reading.with_options(&only, |options| {
+        let options = ImportOptions { programmed: true, ..options.clone() };
+        import(&arguments.trace, &options).map_err(Failure::unreadable)
+    })?;
     show(&trace.notes);
     let bytes = write(trace, &output)?;
     if arguments.json {
@@ -60,7 +61,8 @@ fn write(mut trace: Trace, output: &Path) -> Result<u64, Failure> {
 /// The page of a recording that has just been written: it is read back.
 pub(super) fn write_of_recording(recording: &Path, output: &Path) -> Result<u64, Failure> {
     let only = signals_that_fit(&Recording::open(recording).map_err(Failure::unreadable)?)?;
-    write(import(recording, &ImportOptions { only, ..ImportOptions::default() }).map_err(Failure::unreadable)?, output)
+    let options = ImportOptions { only, programmed: true, ..ImportOptions::default() };
+    write(import(recording, &options).map_err(Failure::unreadable)?, output)
 }
 
 /// The signals of a file that fit into memory; empty = all, also for what is no recording.

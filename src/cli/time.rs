@@ -174,5 +174,6 @@ fn share(optimum: &Optimum, cycle_time_s: f64) -> f64 {
 
 fn optimum_text(optimum: &Optimum, cycle_time_s: f64) -> String {
     let percent = 100.0 * share(optimum, cycle_time_s);
-    format!("\n{cycle_time_s:.1} s, optimum {:.1} s ({percent:.0} %)\n", optimum.time_s)
+    let decimals = if cycle_time_s < 10.0 { 3 } else { 1 };
+    format!("\n{cycle_time_s:.decimals$} s, optimum {:.decimals$} s ({percent:.0} %)\n", optimum.time_s)
 }

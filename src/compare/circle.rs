@@ -3,17 +3,18 @@
 //! In: the set-point line, and for every actual point the place on it where it belongs. Out: [`CircleFigures`] of each full circle in a
 //! plane of two axes: circular deviation G, radial deviations F, the peaks behind the quadrants, and G(b) over both directions.
 //!
-//! * G: width of the ring about the centre of the least-squares circle of the actual path that holds it (ISO 230-4 allows the least-squares
-//!   centre and the minimum zone; this is the former).
+//! * G: width of the narrowest ring that holds the actual path (minimum zone), which is how ISO 230-4 defines it, and the width about the
+//!   centre of the least-squares circle, by which the norm lets it be evaluated and which most instruments show. The latter is never smaller.
 //! * F max, F min: distance from the nominal centre minus the nominal radius, both of the set-points. Outside counts positive.
-//! * G(b): the same width for a circle and the circle in the other direction with the same centre and radius, together, about the centre of
-//!   both.
+//! * G(b): the same two widths for a circle and the circle in the other direction with the same centre and radius, together.
 //! * Quadrant peak: largest outward distance within 20 degrees behind the place where an axis turns back, over the mean of the 15 degrees before it.
 //!
-//! Does not look for arcs of less than a full turn, nor for circles in oblique planes.
+//! Arcs of less than a full turn are counted and not judged: on a part of a circle the centre is hardly determined, and G would say more
+//! about it than about the machine. Does not look for circles in oblique planes.
 
 use super::heading::Heading;
 use super::path::Match;
+use super::round::{fit_circle, minimum_zone, ring};
 use crate::base::units::{UM_PER_MM, deg_from_rad, rad_from_deg};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -32,8 +33,10 @@ pub struct CircleFigures {
     pub start_s: f64,
     /// When they leave it.
     pub end_s: f64,
-    /// Circular deviation G.
+    /// Circular deviation G about the centre of the least-squares circle.
     pub deviation_um: f64,
+    /// Circular deviation G by the minimum zone.
+    pub minimum_zone_um: f64,
     /// Largest and smallest radial deviation F.
     pub radial_max_um: f64,
     /// See above.
@@ -42,6 +45,8 @@ pub struct CircleFigures {
     pub radial_mean_um: f64,
     /// Bi-directional circular deviation G(b), with the circle of the other direction; `None` without one.
     pub bidirectional_um: Option<f64>,
+    /// The same by the minimum zone.
+    pub bidirectional_minimum_zone_um: Option<f64>,
     /// Peaks behind the quadrants at 0, 90, 180 and 270 degrees; `None` where the circle was not passed with enough samples around.
     pub quadrant_peaks_um: [Option<f64>; 4],
 }
@@ -59,6 +64,8 @@ struct Round {
 const PLANES: [([usize; 2], [&str; 2]); 3] = [([0, 1], ["X", "Y"]), ([2, 0], ["Z", "X"]), ([1, 2], ["Y", "Z"])];
 /// A run of equal curvature that turns less than this is no full circle.
 const TURN_MIN_RAD: f64 = TAU * 0.95;
+/// A run that turns by less than this is no arc.
+const ARC_MIN_RAD: f64 = FRAC_PI_2 * 0.5;
 /// Curvature may differ from that of the run by this share.
 const CURVATURE_SHARE: f64 = 0.05;
 /// Way over which the curvature is measured at least.
@@ -81,11 +88,14 @@ pub struct Actual<'a> {
     pub line_time_s: &'a dyn Fn(f64) -> f64,
 }
 
-/// All full circles of a line.
-pub fn circles(heading: &Heading, actual: &Actual<'_>) -> Vec<CircleFigures> {
+/// All full circles of a line, in order of time, and the number of shorter arcs.
+pub fn circles(heading: &Heading, actual: &Actual<'_>) -> (Vec<CircleFigures>, usize) {
     let mut rounds: Vec<Round> = Vec::new();
+    let mut arcs = 0;
     for (axes, plane) in PLANES {
-        for (from, to) in runs(heading, axes) {
+        let found = runs(heading, axes);
+        arcs += found.arcs;
+        for (from, to) in found.full {
             rounds.extend(judge(heading, axes, plane, from..to, actual));
         }
     }
@@ -93,9 +103,11 @@ pub fn circles(heading: &Heading, actual: &Actual<'_>) -> Vec<CircleFigures> {
     for i in 0..rounds.len() {
         let partner = (0..rounds.len()).filter(|j| opposite(&rounds[i].figures, &rounds[*j].figures));
         let nearest = partner.min_by_key(|j| j.abs_diff(i));
-        rounds[i].figures.bidirectional_um = nearest.and_then(|j| both_ways(&rounds[i], &rounds[j]));
+        let both = nearest.and_then(|j| both_ways(&rounds[i], &rounds[j]));
+        rounds[i].figures.bidirectional_um = both.map(|[about_mean, _]| about_mean);
+        rounds[i].figures.bidirectional_minimum_zone_um = both.map(|[_, narrowest]| narrowest);
     }
-    rounds.into_iter().map(|round| round.figures).collect()
+    (rounds.into_iter().map(|round| round.figures).collect(), arcs)
 }
 
 fn opposite(a: &CircleFigures, b: &CircleFigures) -> bool {
@@ -107,26 +119,36 @@ fn opposite(a: &CircleFigures, b: &CircleFigures) -> bool {
         && near(a.centre_mm[1], b.centre_mm[1])
 }
 
-fn both_ways(a: &Round, b: &Round) -> Option<f64> {
+/// G(b) about the centre of both, and by the minimum zone.
+fn both_ways(a: &Round, b: &Round) -> Option<[f64; 2]> {
     let shift: [f64; 2] = std::array::from_fn(|i| b.figures.centre_mm[i] - a.figures.centre_mm[i]);
     let both = |a: &[[f64; 2]], b: &[[f64; 2]]| -> Vec<[f64; 2]> {
         a.iter().copied().chain(b.iter().map(|p| [p[0] + shift[0], p[1] + shift[1]])).collect()
     };
     let (centre, _) = fit_circle(&both(&a.spread_mm, &b.spread_mm))?;
-    Some(um(ring(&both(&a.points_mm, &b.points_mm), centre)))
+    let points_mm = both(&a.points_mm, &b.points_mm);
+    Some([um(ring(&points_mm, centre)), um(minimum_zone(&points_mm, centre))])
 }
 
 fn um(length_mm: f64) -> f64 {
     length_mm * UM_PER_MM
 }
 
-/// Stretches of constant curvature in a plane that turn fully: `from..to` in points of the heading.
-fn runs(heading: &Heading, axes: [usize; 2]) -> Vec<(usize, usize)> {
+/// Stretches of constant curvature in a plane.
+#[derive(Default)]
+struct Runs {
+    /// Those that turn fully: `from..to` in points of the heading.
+    full: Vec<(usize, usize)>,
+    /// Number of those that turn by [`ARC_MIN_RAD`] and more, but not fully.
+    arcs: usize,
+}
+
+fn runs(heading: &Heading, axes: [usize; 2]) -> Runs {
     let points = &heading.points_mm;
     let half = ((WINDOW_MM / heading.step_mm).ceil() as usize).max(2);
     let n = points.len();
     if n < 4 * half {
-        return Vec::new();
+        return Runs::default();
     }
     let other = 3 - axes[0] - axes[1];
     let angle = |i: usize| {
@@ -135,14 +157,17 @@ fn runs(heading: &Heading, axes: [usize; 2]) -> Vec<(usize, usize)> {
     };
     // Over half a window the angle turns by far more than the chords of the set-points make it uncertain.
     let stride = half.div_ceil(2);
-    let mut found = Vec::new();
+    let mut found = Runs::default();
     let (mut start, mut turned, mut steps, mut last): (usize, f64, f64, Option<f64>) = (half, 0.0, 0.0, None);
     let mut close = |start: usize, end: usize, turned: f64| {
         // The window shortens a run at both ends by half of itself: that much of the circle lies outside.
         let end = end.max(start);
         let mean = turned.abs() / (end - start).max(1) as f64;
-        if turned.abs() + 2.0 * half as f64 * mean >= TURN_MIN_RAD {
-            found.push((start, end));
+        let whole = turned.abs() + 2.0 * half as f64 * mean;
+        if whole >= TURN_MIN_RAD {
+            found.full.push((start, end));
+        } else if whole >= ARC_MIN_RAD && end - start >= 2 * half {
+            found.arcs += 1;
         }
     };
     for i in (half..n - half).step_by(stride) {
@@ -206,10 +231,12 @@ fn judge(
         start_s: (actual.line_time_s)(from_mm),
         end_s: (actual.line_time_s)(to_mm),
         deviation_um: um(ring(&points_mm, actual_centre)),
+        minimum_zone_um: um(minimum_zone(&points_mm, actual_centre)),
         radial_max_um: um(span.1),
         radial_min_um: um(span.0),
         radial_mean_um: um(mean_mm),
         bidirectional_um: None,
+        bidirectional_minimum_zone_um: None,
         quadrant_peaks_um: std::array::from_fn(|q| {
             quadrant_peak([&points_mm, &spread_mm], radius_mm, q as f64 * FRAC_PI_2, counter_clockwise)
         }),
@@ -287,62 +314,4 @@ fn quadrant_peak(points_mm: [&[[f64; 2]]; 2], radius_mm: f64, at_rad: f64, count
     let behind = all.filter(|(behind_deg, _)| (-2.0..20.0).contains(behind_deg));
     let peak = behind.fold(f64::MIN, |peak, (_, radial_mm)| peak.max(radial_mm));
     (count >= 3.0 && peak > f64::MIN).then(|| um(peak - before / count))
-}
-
-/// Width of the ring about a centre that holds all points.
-fn ring(points_mm: &[[f64; 2]], centre_mm: [f64; 2]) -> f64 {
-    let radii = points_mm.iter().map(|p| (p[0] - centre_mm[0]).hypot(p[1] - centre_mm[1]));
-    let (least, most) = radii.fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
-    (most - least).max(0.0)
-}
-
-/// Least-squares circle: algebraic first, then Gauss-Newton on the distances. `points` from anywhere; at least half a turn is needed for
-/// a sound result. `None` for fewer than five points or points on a line.
-pub fn fit_circle(points_mm: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
-    let n = points_mm.len() as f64;
-    if points_mm.len() < 5 {
-        return None;
-    }
-    let mean: [f64; 2] = std::array::from_fn(|i| points_mm.iter().map(|p| p[i]).sum::<f64>() / n);
-    let (mut uu, mut vv, mut uv, mut uz, mut vz, mut zz) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for p in points_mm {
-        let (u, v) = (p[0] - mean[0], p[1] - mean[1]);
-        let z = u * u + v * v;
-        uu += u * u;
-        vv += v * v;
-        uv += u * v;
-        uz += u * z;
-        vz += v * z;
-        zz += z;
-    }
-    let determinant = uu * vv - uv * uv;
-    // Written so that NaN is none too.
-    let bent = determinant > 1e-12 * (uu + vv).powi(2);
-    if !bent {
-        return None;
-    }
-    let mut c = [0.5 * (uz * vv - vz * uv) / determinant, 0.5 * (vz * uu - uz * uv) / determinant];
-    let mut r = (c[0] * c[0] + c[1] * c[1] + zz / n).sqrt();
-    for _ in 0..20 {
-        // Sums of the normal equations in (centre, radius), with unit vectors from the centre.
-        let mut m = nalgebra::Matrix3::<f64>::zeros();
-        let mut g = nalgebra::Vector3::<f64>::zeros();
-        for p in points_mm {
-            let d = [p[0] - mean[0] - c[0], p[1] - mean[1] - c[1]];
-            let length = d[0].hypot(d[1]);
-            if length == 0.0 {
-                continue;
-            }
-            let row = nalgebra::Vector3::new(d[0] / length, d[1] / length, 1.0);
-            m += row * row.transpose();
-            g += row * (length - r);
-        }
-        let step = m.lu().solve(&g)?;
-        c = [c[0] + step[0], c[1] + step[1]];
-        r += step[2];
-        if step.norm() < 1e-12 * r {
-            break;
-        }
-    }
-    (r.is_finite() && r > 0.0).then_some(([mean[0] + c[0], mean[1] + c[1]], r))
 }

@@ -5,7 +5,7 @@
 //! Differences are trace - reference at the samples of the trace; the reference is read between its samples by a cubic, states are held, gaps
 //! stay gaps. Does not print and does not judge: [`check_limits`](super::check_limits) does.
 
-use super::budget::{Budget, budget};
+use super::budget::{Budget, BudgetGround, budget};
 use super::contour::{Contour, Features, PLANES, contour, features};
 use super::geometry::{ACTUAL_STEMS, SETPOINT_STEMS, Track, machine_of, track};
 use super::lines::{LineTimes, Lines, line_times};
@@ -148,14 +148,16 @@ pub fn compare(trace: &Trace, reference: &Trace, options: &CompareOptions) -> Re
     let alignment = alignment(&channels, options, &mut notes);
     let machine = machine_of(reference).or_else(|| machine_of(trace));
     let at = alignment.unwrap_or_else(Alignment::none);
-    let actual = [trace, reference].map(|side| track(side, machine.as_ref(), &ACTUAL_STEMS));
-    let setpoints = [trace, reference].map(|side| track(side, machine.as_ref(), &SETPOINT_STEMS));
+    // The same tool on both sides: with its length only where both tell it.
+    let tools = !trace.programmed.is_empty() && !reference.programmed.is_empty();
+    let actual = [trace, reference].map(|side| track(side, machine.as_ref(), &ACTUAL_STEMS, tools));
+    let setpoints = [trace, reference].map(|side| track(side, machine.as_ref(), &SETPOINT_STEMS, tools));
     let contour = path_comparison(&actual, &at, plane);
     let matches = contour.as_ref().map(|found| (&found.track, found.contour.matches.as_slice()));
     let figures = pairs.iter().map(|pair| pair_figures(pair, &at, matches, options.without_bias)).collect();
-    let lines = contour.as_ref().map_or_else(Vec::new, |found| {
-        line_times(&Lines::of(trace).or(Lines::of(reference), at), &found.track, &found.contour.matches)
-    });
+    let executed = [Lines::of(trace).or(Lines::of(reference), at), Lines::of(reference)];
+    let lines =
+        contour.as_ref().map_or_else(Vec::new, |found| line_times(&executed[0], &found.track, &found.contour.matches));
     if let Some(found) = &contour
         && found.contour.matched_share < 0.9
     {
@@ -165,7 +167,18 @@ pub fn compare(trace: &Trace, reference: &Trace, options: &CompareOptions) -> Re
     let bases = cycle_times(trace, reference, &actual);
     let [own_a, own_b] = own;
     let [a, b] = bases;
-    let sides = [side(trace, a, own_a, options.budget), side(reference, b, own_b, options.budget)];
+    let [lines_a, lines_b] = &executed;
+    let budget_of = |side: &Trace, own: &Option<OwnContour>, lines: &Lines, other: &Trace| {
+        options.budget.then(|| {
+            let own_machine = machine_of(side);
+            let machine = own_machine.as_ref().or(machine.as_ref());
+            let other = Some(&other.programmed);
+            budget(side, &BudgetGround { machine, own: own.as_ref(), lines: Some(lines), other })
+        })
+    };
+    let budget_a = budget_of(trace, &own_a, lines_a, reference);
+    let budget_b = budget_of(reference, &own_b, lines_b, trace);
+    let sides = [side(trace, a, own_a, budget_a), side(reference, b, own_b, budget_b)];
     Ok(Comparison { sides, alignment, aligned_by, pairs: figures, contour, lines, notes })
 }
 
@@ -279,8 +292,8 @@ pub(super) fn own_contour_of(
 pub fn examine(trace: &Trace, plane: Option<&str>) -> Result<Side, Diagnostic> {
     let plane = plane_of(plane)?;
     let machine = machine_of(trace);
-    let actual = track(trace, machine.as_ref(), &ACTUAL_STEMS);
-    let setpoints = track(trace, machine.as_ref(), &SETPOINT_STEMS);
+    let actual = track(trace, machine.as_ref(), &ACTUAL_STEMS, true);
+    let setpoints = track(trace, machine.as_ref(), &SETPOINT_STEMS, true);
     let own = match (&actual, &setpoints) {
         (Some(actual), Some(commanded)) if actual.stem != "position_setpoint" => {
             own_contour_of(actual, commanded, actual.time_s(0), plane, "")
@@ -291,18 +304,19 @@ pub fn examine(trace: &Trace, plane: Option<&str>) -> Result<Side, Diagnostic> {
         Some(time_s) => (Some(time_s), RECORDED),
         None => (motion_time_s(&actual), MOTION),
     };
-    Ok(side(trace, basis, own, true))
+    let ground = BudgetGround { machine: machine.as_ref(), own: own.as_ref(), ..BudgetGround::default() };
+    let budget = budget(trace, &ground);
+    Ok(side(trace, basis, own, Some(budget)))
 }
 
 fn side(
     trace: &Trace,
     (cycle_time_s, cycle_time_basis): (Option<f64>, &'static str),
     own: Option<OwnContour>,
-    with_budget: bool,
+    budget: Option<Budget>,
 ) -> Side {
     let delay =
         |axis: &str| setpoint_delay_s(trace, axis).map(|(delay_s, error_s)| (axis.to_owned(), delay_s, error_s));
-    let budget = with_budget.then(|| budget(trace, machine_of(trace).as_ref(), own.as_ref()));
     Side {
         name: trace.name.clone(),
         description: trace.origin.description.clone(),

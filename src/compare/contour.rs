@@ -69,6 +69,8 @@ fn signed_distance(found: &Match, plane: usize) -> f64 {
 pub struct Features {
     /// Full circles in order of time.
     pub circles: Vec<CircleFigures>,
+    /// Arcs of 45 degrees and more that are no full circle: counted, not judged.
+    pub arcs_total: usize,
     /// Corners in order of the way.
     pub corners: Vec<CornerFigures>,
 }
@@ -82,5 +84,6 @@ pub fn features(line: &Line, track: &Track, matches: &[Option<Match>]) -> Featur
         times.get(i).map_or(f64::NAN, |(_, time_s)| *time_s)
     };
     let actual = Actual { points_mm: &track.points_mm, matches, line_time_s: &time_s };
-    Features { circles: circles(&heading, &actual), corners: corners(&heading, &time_s, matches) }
+    let (circles, arcs_total) = circles(&heading, &actual);
+    Features { circles, arcs_total, corners: corners(&heading, &time_s, matches) }
 }

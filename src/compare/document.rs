@@ -131,6 +131,7 @@ fn own_json(own: &OwnContour) -> Map<String, Value> {
         "contour_error_max_at_s": own.contour.space.max_at_s,
         "contour_error_plane_bias_mm": plane.map(|f| f.bias),
         "circles": own.features.circles.iter().map(circle_json).collect::<Vec<_>>(),
+        "arcs_not_judged": own.features.arcs_total,
         "corners_total": own.features.corners.len(),
         "corners": worst.into_iter().take(LISTED_MAX).map(corner_json).collect::<Vec<_>>(),
     });
@@ -158,6 +159,7 @@ pub fn budget_json(budget: &Budget) -> Value {
         "chord": part(&budget.chord),
         "interpolator": part(&budget.interpolator),
         "drives": part(&budget.drives),
+        "program_of_other": budget.program_of_other,
         "missing": missing,
     })
 }
@@ -171,7 +173,9 @@ fn circle_json(circle: &CircleFigures) -> Value {
         "start_s": circle.start_s,
         "end_s": circle.end_s,
         "circular_deviation_um": circle.deviation_um,
+        "circular_deviation_minimum_zone_um": circle.minimum_zone_um,
         "bidirectional_deviation_um": circle.bidirectional_um,
+        "bidirectional_deviation_minimum_zone_um": circle.bidirectional_minimum_zone_um,
         "radial_max_um": circle.radial_max_um,
         "radial_min_um": circle.radial_min_um,
         "radial_mean_um": circle.radial_mean_um,

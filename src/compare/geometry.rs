@@ -1,16 +1,16 @@
 //! Where the tool was: points in space from the positions of the axes of a trace.
 //!
 //! In: a trace, which positions (set-points, actual). Out: [`Track`]: X, Y, Z on one time base; with a machine file that turns the table or
-//! the head, the tool tip in the part, so that five axes are judged where they cut. The length of the tool is not known to a trace: a
-//! tool without length is taken. Rotary axes without a machine file do not enter. Does not decide what is compared with what.
+//! the head, the tool tip in the part, so that five axes are judged where they cut: with the length of the tool where the recording tells
+//! it, otherwise of a tool without length. Rotary axes without a machine file do not enter. Does not decide what is compared with what.
 
 use super::path::Line;
 use super::series::{Series, noise_of};
 use crate::base::units::rad_from_deg;
-use crate::base::{AxisKind, AxisVector, MachinePoint, SourceText};
+use crate::base::{AxisId, AxisKind, AxisVector, MachinePoint, SourceText};
 use crate::kinematics::Kinematics;
 use crate::machine::{KinematicsSettings, Machine};
-use crate::trace::{Signal, TimeGrid, Trace};
+use crate::trace::{ProgrammedPath, Signal, TimeGrid, Trace};
 
 /// Positions in space over time.
 #[derive(Clone, Debug)]
@@ -66,12 +66,13 @@ pub fn machine_of(trace: &Trace) -> Option<Machine> {
     crate::machine::parse(&source, &[]).ok().map(|loaded| loaded.machine)
 }
 
-/// The first of the fields of which X, Y or Z have signals that move; `None` if none does.
-pub fn track(trace: &Trace, machine: Option<&Machine>, stems: &[&'static str]) -> Option<Track> {
-    stems.iter().find_map(|stem| of_stem(trace, machine, stem))
+/// The first of the fields of which X, Y or Z have signals that move; `None` if none does. `tools`: with the lengths of the tools, if the
+/// trace knows them; matters only where the part or the tool turns.
+pub fn track(trace: &Trace, machine: Option<&Machine>, stems: &[&'static str], tools: bool) -> Option<Track> {
+    stems.iter().find_map(|stem| of_stem(trace, machine, stem, tools))
 }
 
-fn of_stem(trace: &Trace, machine: Option<&Machine>, stem: &'static str) -> Option<Track> {
+fn of_stem(trace: &Trace, machine: Option<&Machine>, stem: &'static str, tools: bool) -> Option<Track> {
     let linear = |name: &str| {
         trace.axis_signal(name, stem).filter(|s| s.axis_signal().is_some_and(|own| own.kind == AxisKind::Linear))
     };
@@ -106,7 +107,9 @@ fn of_stem(trace: &Trace, machine: Option<&Machine>, stem: &'static str) -> Opti
     if let Some((machine, rotary)) = &joints {
         let angles: Vec<(usize, Vec<f64>)> = rotary.iter().map(|(i, signal)| (*i, on_base(signal))).collect();
         axes.extend(rotary.iter().filter_map(|(_, s)| Some(s.axis_signal()?.axis.to_owned())));
-        into_part(machine, &angles, &mut points_mm);
+        let lengths = Lengths { path: tools.then_some(&trace.programmed), tips: Tips::new(machine) };
+        let time_s = |k: usize| base.times.time_s(k) - base.meaning.delay_s;
+        into_part(&lengths, &angles, &mut points_mm, &time_s);
     }
     let first = points_mm.iter().find(|p| p.iter().all(|x| x.is_finite()))?;
     let still_mm = (20.0 * noise_mm).max(1e-4);
@@ -122,21 +125,77 @@ fn of_stem(trace: &Trace, machine: Option<&Machine>, stem: &'static str) -> Opti
     })
 }
 
+/// The tips of tools of a machine.
+pub(super) struct Tips {
+    kinematics: Kinematics,
+    ids: Vec<AxisId>,
+    geometry: [Option<AxisId>; 3],
+    names: Vec<String>,
+}
+
+impl Tips {
+    pub(super) fn new(machine: &Machine) -> Self {
+        Self {
+            kinematics: Kinematics::new(machine),
+            ids: machine.axis_ids().collect(),
+            geometry: ["X", "Y", "Z"].map(|name| machine.axis_by_name(name)),
+            names: machine.axes.iter().map(|axis| axis.name.clone()).collect(),
+        }
+    }
+
+    /// Places of axes in the machine, by their names.
+    pub(super) fn places<'a>(&self, names: impl Iterator<Item = &'a str>) -> Vec<Option<AxisId>> {
+        let place = |name: &str| self.names.iter().position(|own| own == name).map(|i| self.ids[i]);
+        names.map(place).collect()
+    }
+
+    /// The tip in the part when the axes stand at `posture`. `length`: of the tool, as axes - tip.
+    pub(super) fn in_part(&self, posture: &MachinePoint, length: &AxisVector) -> [f64; 3] {
+        self.kinematics.tip_pose(posture, length).position_mm
+    }
+}
+
+/// Lengths of the tools over time.
+struct Lengths<'a> {
+    path: Option<&'a ProgrammedPath>,
+    tips: Tips,
+}
+
+impl Lengths<'_> {
+    fn at(&self, time_s: f64, places: &[Option<AxisId>]) -> AxisVector {
+        let mut length = AxisVector::zero();
+        let block = self.path.and_then(|path| path.block(path.index_at(time_s + TICK_SLACK_S)?));
+        for (value_mm, place) in block.iter().flat_map(|block| block.tool_length_mm).zip(places) {
+            if let Some(axis) = place {
+                length[*axis] = *value_mm;
+            }
+        }
+        length
+    }
+}
+
+/// An instant of a signal and that of a block are the same within this.
+pub(super) const TICK_SLACK_S: f64 = 1e-9;
+
 /// Points of the slides -> points of the tool tip in the part. `angles`: place of the axis in the machine, angles in deg.
-fn into_part(machine: &Machine, angles: &[(usize, Vec<f64>)], points_mm: &mut [[f64; 3]]) {
-    let kinematics = Kinematics::new(machine);
-    let ids: Vec<_> = machine.axis_ids().collect();
-    let geometry = ["X", "Y", "Z"].map(|name| machine.axis_by_name(name));
+fn into_part(
+    lengths: &Lengths<'_>,
+    angles: &[(usize, Vec<f64>)],
+    points_mm: &mut [[f64; 3]],
+    time_s: &dyn Fn(usize) -> f64,
+) {
+    let tips = &lengths.tips;
+    let places = lengths.path.map_or_else(Vec::new, |path| tips.places(path.axes()));
     for (k, point) in points_mm.iter_mut().enumerate() {
         let mut posture = MachinePoint(AxisVector::zero());
-        for (axis, value_mm) in geometry.iter().zip(*point) {
+        for (axis, value_mm) in tips.geometry.iter().zip(*point) {
             if let Some(axis) = axis {
                 posture.0[*axis] = value_mm;
             }
         }
         for (place, values_deg) in angles {
-            posture.0[ids[*place]] = rad_from_deg(values_deg[k]);
+            posture.0[tips.ids[*place]] = rad_from_deg(values_deg[k]);
         }
-        *point = kinematics.tool_pose(&posture).position_mm;
+        *point = tips.in_part(&posture, &lengths.at(time_s(k), &places));
     }
 }

@@ -16,11 +16,14 @@ mod lines;
 mod offset;
 mod pairs;
 mod path;
+mod programmed;
+mod round;
+mod rows;
 mod series;
 mod statistics;
 
-pub use budget::{Budget, Part, budget};
-pub use circle::{CircleFigures, fit_circle};
+pub use budget::{Budget, BudgetGround, Part, budget};
+pub use circle::CircleFigures;
 pub use comparison::{
     CompareOptions, Comparison, OwnContour, PairFigures, PathComparison, Side, compare, examine, prepare,
 };
@@ -32,5 +35,7 @@ pub use limits::{LimitCheck, LimitRule, check_limits, parse_limit};
 pub use lines::{LineTimes, Lines, ProgramLine};
 pub use offset::{Alignment, Channel, align, residual_delay};
 pub use path::{Follower, Line, Match};
+pub use round::fit_circle;
+pub use rows::{Rows, arcs_remark, budget_rows, circle_rows, corner_rows, line_rows, pair_rows, significant, um};
 pub use series::{Cursor, Series, noise_of};
 pub use statistics::{Figures, Gathering};

@@ -138,6 +138,8 @@ pub struct Follower<'a> {
     /// Centre and radius of each block of vertices.
     blocks: Vec<([f64; 3], f64)>,
     at: usize,
+    /// Segments that may be matched, first and last.
+    range: [usize; 2],
     last_point_mm: Option<[f64; 3]>,
     /// Points to let pass before the next search over all, and how many the one after lets pass.
     wait: u32,
@@ -162,10 +164,20 @@ impl<'a> Follower<'a> {
             line,
             blocks: blocks.collect(),
             at: at.min(line.segments() - 1),
+            range: [0, line.segments() - 1],
             last_point_mm: None,
             wait: 0,
             patience: 1,
         })
+    }
+
+    /// From now on only the part of the line counts where its own clock shows `from_s` to `to_s`.
+    pub fn restrict(&mut self, from_s: f64, to_s: f64) {
+        let vertex = |time_s: f64| self.line.vertices.partition_point(|v| v.arrived_s <= time_s).saturating_sub(1);
+        let last = self.line.segments() - 1;
+        let from = vertex(from_s).min(last);
+        self.range = [from, vertex(to_s).saturating_sub(1).clamp(from, last)];
+        self.at = self.at.clamp(from, self.range[1]);
     }
 
     /// Where the next point of the track belongs; `None` for a point that is not finite.
@@ -202,7 +214,7 @@ impl<'a> Follower<'a> {
         let reach_mm = 3.0 * step_mm + REACH_MIN_MM + 4.0 * distance_mm;
         let mut best = (self.line.on_segment(self.at, point_mm).0, self.at);
         let from_mm = vertices[self.at].s_mm;
-        for j in (0..self.at).rev() {
+        for j in (self.range[0]..self.at).rev() {
             if from_mm - vertices[j + 1].s_mm > reach_mm {
                 break;
             }
@@ -212,7 +224,7 @@ impl<'a> Follower<'a> {
             }
         }
         let from_mm = vertices.get(self.at + 1).map_or(from_mm, |v| v.s_mm);
-        for (j, vertex) in vertices.iter().enumerate().take(self.line.segments()).skip(self.at + 1) {
+        for (j, vertex) in vertices.iter().enumerate().take(self.range[1] + 1).skip(self.at + 1) {
             if vertex.s_mm - from_mm > reach_mm {
                 break;
             }
@@ -227,12 +239,13 @@ impl<'a> Follower<'a> {
     /// Nearest segment of all; blocks that are too far away are passed over.
     fn anywhere(&self, point_mm: [f64; 3], bound2: f64) -> (f64, usize) {
         let mut best = (bound2, self.at);
-        for (i, (centre, radius_mm)) in self.blocks.iter().enumerate() {
+        let [first, last] = self.range;
+        for (i, (centre, radius_mm)) in self.blocks.iter().enumerate().take(last / BLOCK + 1).skip(first / BLOCK) {
             let least_mm = norm(minus(point_mm, *centre)) - radius_mm;
             if least_mm > 0.0 && least_mm * least_mm >= best.0 {
                 continue;
             }
-            for j in i * BLOCK..((i + 1) * BLOCK).min(self.line.segments()) {
+            for j in first.max(i * BLOCK)..((i + 1) * BLOCK).min(last + 1) {
                 let d = self.line.on_segment(j, point_mm).0;
                 if d < best.0 {
                     best = (d, j);

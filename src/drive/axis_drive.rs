@@ -15,7 +15,7 @@ use super::plant::{Plant, PlantState};
 use super::position_loop::{PositionLoop, SpeedCommand};
 use super::reversal::{Correction, Reversal};
 use super::second_mass::{TwoMass, TwoMassState};
-use super::speed_loop::{SpeedLaw, SpeedLoop, TorqueCommand};
+use super::speed_loop::{SpeedLoop, TorqueCommand};
 use super::wire::{AxisSignals, Start, flags};
 use crate::base::TimeBase;
 use crate::machine::{Axis, PositionSource};
@@ -39,39 +39,39 @@ pub struct AxisDrive {
     reversal: Reversal,
     position_encoder: PositionEncoder,
     position_loop: PositionLoop,
-    motor_encoder: MotorEncoder,
-    speed_loop: SpeedLoop,
-    current_loop: CurrentLoop,
-    plant: Plant,
+    pub(super) motor_encoder: MotorEncoder,
+    pub(super) speed_loop: SpeedLoop,
+    pub(super) current_loop: CurrentLoop,
+    pub(super) plant: Plant,
     /// i, w, th of the motor.
-    state: PlantState,
+    pub(super) state: PlantState,
     /// The load behind a spring; boxed, as most axes have none.
-    second_mass: Option<Box<SecondMass>>,
+    pub(super) second_mass: Option<Box<SecondMass>>,
     /// Boxed as the second mass is.
-    pitch_error: Option<Box<PitchError>>,
-    backlash: Option<Backlash>,
+    pub(super) pitch_error: Option<Box<PitchError>>,
+    pub(super) backlash: Option<Backlash>,
     monitor: Monitor,
     /// MD31040 = 0: the position is that of the motor.
     motor_measures: bool,
     /// MD32640.
-    stiffness_control: bool,
+    pub(super) stiffness_control: bool,
     /// x_ref of the position cycle before.
-    reference_before_lu: f64,
+    pub(super) reference_before_lu: f64,
     /// r.
     transmission_lu_per_rad: f64,
     /// n_p = T_p / T_v.
-    speed_ticks: u32,
+    pub(super) speed_ticks: u32,
     /// T_p.
-    position_period_s: f64,
+    pub(super) position_period_s: f64,
     /// n_v = T_v / T_i.
-    current_ticks: u32,
+    pub(super) current_ticks: u32,
     /// Mean of the current over the last position cycle.
-    current_mean_a: f64,
+    pub(super) current_mean_a: f64,
 }
 
 /// Motor, spring and load, and their state.
 #[derive(Clone, Debug)]
-struct SecondMass {
+pub(super) struct SecondMass {
     plant: TwoMass,
     state: TwoMassState,
 }
@@ -87,42 +87,22 @@ pub(super) struct Position {
 }
 
 /// What a position cycle begins with.
-struct Beginning {
-    terms: Terms,
-    correction: Correction,
-    position: Position,
-    view: View,
-}
-
-/// What holds in a position cycle of a plain axis.
-#[derive(Clone, Copy)]
-pub(super) struct Prepared {
-    input: DriveInput,
+pub(super) struct Beginning {
     pub(super) terms: Terms,
+    pub(super) correction: Correction,
     pub(super) position: Position,
-    view: View,
-    /// Gravity and outside load.
-    pub(super) gravity_n_m: f64,
-}
-
-/// The inner boxes of an axis whose speed loop, current loop and plant are all there is between two position cycles.
-pub(super) struct PlainParts {
-    pub(super) speed_ticks: u32,
-    pub(super) current_ticks: u32,
-    pub(super) speed_law: SpeedLaw,
-    pub(super) current_loop: CurrentLoop,
-    pub(super) plant: Plant,
+    pub(super) view: View,
 }
 
 /// All wires at one tick, by the box that drives them.
-struct Wires {
-    input: DriveInput,
-    terms: Terms,
-    position: Position,
-    view: View,
-    torque: TorqueCommand,
-    gravity_n_m: f64,
-    voltage: VoltageCommand,
+pub(super) struct Wires {
+    pub(super) input: DriveInput,
+    pub(super) terms: Terms,
+    pub(super) position: Position,
+    pub(super) view: View,
+    pub(super) torque: TorqueCommand,
+    pub(super) gravity_n_m: f64,
+    pub(super) voltage: VoltageCommand,
 }
 
 impl AxisDrive {
@@ -184,6 +164,9 @@ impl AxisDrive {
 
     /// One position cycle. Returns the signals at its first tick: the state before the plant step with the commands of that tick.
     pub fn step(&mut self, input: DriveInput) -> AxisSignals {
+        if self.is_plain() {
+            return self.step_plain(input);
+        }
         let mut first = AxisSignals::default();
         self.cycle(input, |tick, drive, wires| {
             if tick == 0 {
@@ -235,7 +218,7 @@ impl AxisDrive {
 
     /// What stands before the speed loop: set-point preparation, position loop, monitoring.
     #[inline(always)]
-    fn begin(&mut self, input: &DriveInput) -> Beginning {
+    pub(super) fn begin(&mut self, input: &DriveInput) -> Beginning {
         self.position_loop.brake_on(self.position_period_s);
         let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
         let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
@@ -246,49 +229,6 @@ impl AxisDrive {
             self.monitor.advance(position.reference_lu, terms.velocity_lu_s, self.position_period_s);
         }
         Beginning { terms, correction, position, view }
-    }
-
-    /// The inner boxes; `None`: the axis has something besides, and goes alone (see `batch`).
-    pub(super) fn plain_parts(&self) -> Option<PlainParts> {
-        let plain = self.speed_loop.is_plain()
-            && self.motor_encoder.is_ideal()
-            && !self.stiffness_control
-            && !self.plant.gravity_turns
-            && self.second_mass.is_none()
-            && self.pitch_error.is_none()
-            && self.backlash.is_none();
-        plain.then_some(PlainParts {
-            speed_ticks: self.speed_ticks,
-            current_ticks: self.current_ticks,
-            speed_law: self.speed_loop.law,
-            current_loop: self.current_loop,
-            plant: self.plant,
-        })
-    }
-
-    /// The beginning of a position cycle of a plain axis.
-    pub(super) fn prepare(&mut self, input: DriveInput) -> Prepared {
-        let Beginning { terms, position, view, .. } = self.begin(&input);
-        let gravity_n_m = self.plant.gravity_n_m(self.state.angle_rad) + input.load_n_m;
-        Prepared { input, terms, position, view, gravity_n_m }
-    }
-
-    /// The signals at the first tick of a plain axis.
-    pub(super) fn signals_of(&self, ready: &Prepared, torque: TorqueCommand, voltage: VoltageCommand) -> AxisSignals {
-        let Prepared { input, terms, position, view, gravity_n_m } = *ready;
-        self.signals(&Wires { input, terms, position, view, torque, gravity_n_m, voltage })
-    }
-
-    /// State, Iv, Ii.
-    pub(super) fn memories(&self) -> (PlantState, f64, f64) {
-        (self.state, self.speed_loop.law.integral_n_m, self.current_loop.integral_v)
-    }
-
-    /// The end of a position cycle whose ticks ran in a batch.
-    pub(super) fn finish(&mut self, ready: &Prepared, memories: (PlantState, f64, f64), current_sum_a: f64) {
-        (self.state, self.speed_loop.law.integral_n_m, self.current_loop.integral_v) = memories;
-        self.reference_before_lu = ready.terms.reference_lu;
-        self.current_mean_a = current_sum_a / f64::from(self.ticks_per_step());
     }
 
     /// Encoder, position loop and what is added to its output.
@@ -394,7 +334,8 @@ impl AxisDrive {
     }
 
     /// The wires in the units of the load side.
-    fn signals(&self, wires: &Wires) -> AxisSignals {
+    #[inline]
+    pub(super) fn signals(&self, wires: &Wires) -> AxisSignals {
         let Wires { input, terms, position, view, torque, gravity_n_m, voltage } = wires;
         let (speed, position_lu) = (&position.command, self.load_lu());
         let (sticks, friction_torque_n_m, load_speed_rad_s) = match &self.second_mass {

@@ -28,6 +28,7 @@ impl DelayLine {
     }
 
     /// Takes s\[k\], gives D(s)\[k\].
+    #[inline]
     pub(super) fn step(&mut self, sample: f64) -> f64 {
         let length = self.samples.len();
         self.newest = if self.newest + 1 == length { 0 } else { self.newest + 1 };

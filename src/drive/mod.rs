@@ -9,13 +9,14 @@
 //! ```
 //!
 //! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal`,
-//! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `batch` steps
-//! many drives at once; `spindle` is how the master spindle lags. `docs/drive.md` has
-//! picture, law and code side by side.
+//! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `plain` is
+//! the short way of an axis without all that, `batch` steps many drives at once, `block` by `block`; `spindle` is how the master spindle lags. `docs/drive.md` has picture, law and
+//! code side by side.
 
 mod axis_drive;
-mod batch;
 mod backlash;
+mod batch;
+mod block;
 mod choice;
 mod current_loop;
 mod delay;
@@ -30,6 +31,7 @@ mod limit;
 mod linear_model;
 mod monitor;
 mod pitch_error;
+mod plain;
 mod plant;
 mod position_loop;
 mod reversal;
@@ -40,7 +42,7 @@ mod transition;
 mod wire;
 
 pub use axis_drive::{AxisDrive, DriveInput};
-pub use batch::DriveBatch;
+pub use batch::{DriveBatch, Steps};
 pub use choice::Drive;
 pub use frequency::{FrequencyResponses, GainMargin, LOWEST_HZ, LoopResponse, PhaseMargin, Point, frequency_responses};
 pub use ideal::IdealDrive;

@@ -8,7 +8,7 @@
 //! hundred ticks in any real drive: then the acceleration changes its sign at most once in a tick and no stop is overlooked.
 
 use super::integral::falling_zero;
-use super::transition::{Excess, Transition};
+use super::transition::{Excess, Slopes, Transition};
 use crate::machine::{DriveData, MechanicsData, MotorData};
 
 /// More stops and breakaways than one tick can hold. They cannot follow each other closely, because u is constant in a tick and
@@ -122,9 +122,10 @@ impl Plant {
         self.pieces(state, voltage_v, gravity_n_m, self.period_s, |_| {})
     }
 
-    /// The map over a tick in motion, and whether nothing happened in it. Not for an axis at rest with dry friction.
+    /// The map over a tick in motion, and whether nothing happened in it (`block` has a coarser condition for many ticks). Not for an
+    /// axis at rest with dry friction.
     #[inline(always)]
-    pub(super) fn usual_step(&self, state: PlantState, voltage_v: f64, gravity_n_m: f64) -> (PlantState, bool) {
+    fn usual_step(&self, state: PlantState, voltage_v: f64, gravity_n_m: f64) -> (PlantState, bool) {
         let w = state.speed_rad_s;
         let against_n_m = self.mechanics.coulomb_friction_n_m.copysign(w) + gravity_n_m;
         let excess = self.excess(state, voltage_v, against_n_m);
@@ -132,7 +133,6 @@ impl Plant {
         // The usual tick: the speed keeps its sign at the end, and had no minimum on the other side of zero in between.
         let keeps_sign = next.speed_rad_s * w > 0.0;
         let (before_n_m, after_n_m) = (excess.torque_n_m, self.excess(next, voltage_v, against_n_m).torque_n_m);
-        // No short cuts in these conditions: `batch` takes many axes at once through them.
         let may_dip = (before_n_m * w < 0.0)
             & (after_n_m * w > 0.0)
             & (w.abs() < self.dip_rad_s_per_n_m * (after_n_m - before_n_m).abs());
@@ -229,12 +229,7 @@ impl Plant {
     /// Voltage and torque left over for L i' and J w'; `against_n_m` = dry friction and gravity.
     #[inline(always)]
     fn excess(&self, state: PlantState, voltage_v: f64, against_n_m: f64) -> Excess {
-        let MotorData { resistance_ohm: r, back_emf_v_s_per_rad: ke, torque_constant_n_m_per_a: kt, .. } = self.motor;
-        let PlantState { current_a: i, speed_rad_s: w, .. } = state;
-        Excess {
-            voltage_v: (voltage_v - r * i) - ke * w,
-            torque_n_m: (kt * i - against_n_m) - self.mechanics.viscous_friction_n_m_s_per_rad * w,
-        }
+        Slopes::of(&self.motor, &self.mechanics).excess(state, voltage_v, against_n_m)
     }
 }
 

@@ -56,6 +56,7 @@ impl PositionLoop {
     }
 
     /// One position cycle.
+    #[inline]
     pub(super) fn step(&self, reference_lu: f64, measured_lu: f64, velocity_feedforward_lu_s: f64) -> SpeedCommand {
         let deviation_lu = reference_lu - measured_lu;
         let wanted_lu_s = self.gain_per_s * deviation_lu + velocity_feedforward_lu_s;

@@ -38,7 +38,7 @@ pub(super) struct SpeedLaw {
 pub(super) struct SpeedLoop {
     pub(super) law: SpeedLaw,
     /// Kt.
-    torque_constant_n_m_per_a: f64,
+    pub(super) torque_constant_n_m_per_a: f64,
     /// p1414.
     speed_filter: Chain,
     /// p1433.

@@ -38,6 +38,41 @@ pub(super) struct Excess {
     pub(super) torque_n_m: f64,
 }
 
+/// What the slopes are made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Slopes {
+    /// R.
+    pub(super) resistance_ohm: f64,
+    /// Ke.
+    pub(super) back_emf_v_s_per_rad: f64,
+    /// Kt.
+    pub(super) torque_constant_n_m_per_a: f64,
+    /// B.
+    pub(super) viscous_friction_n_m_s_per_rad: f64,
+}
+
+impl Slopes {
+    #[inline(always)]
+    pub(super) fn of(motor: &MotorData, mechanics: &MechanicsData) -> Self {
+        Self {
+            resistance_ohm: motor.resistance_ohm,
+            back_emf_v_s_per_rad: motor.back_emf_v_s_per_rad,
+            torque_constant_n_m_per_a: motor.torque_constant_n_m_per_a,
+            viscous_friction_n_m_s_per_rad: mechanics.viscous_friction_n_m_s_per_rad,
+        }
+    }
+
+    /// `against_n_m` = dry friction and gravity.
+    #[inline(always)]
+    pub(super) fn excess(&self, state: PlantState, voltage_v: f64, against_n_m: f64) -> Excess {
+        let PlantState { current_a: i, speed_rad_s: w, .. } = state;
+        Excess {
+            voltage_v: (voltage_v - self.resistance_ohm * i) - self.back_emf_v_s_per_rad * w,
+            torque_n_m: (self.torque_constant_n_m_per_a * i - against_n_m) - self.viscous_friction_n_m_s_per_rad * w,
+        }
+    }
+}
+
 impl Transition {
     /// The map over `duration_s`.
     pub(super) fn over(motor: &MotorData, mechanics: &MechanicsData, duration_s: f64) -> Self {

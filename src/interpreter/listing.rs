@@ -318,5 +318,6 @@ fn event_text(event: &Event) -> String {
         Event::SpindlePosition(positioning) if positioning.text.is_empty() => "spindle=0".to_owned(),
         Event::SpindlePosition(positioning) => positioning.text.to_string(),
         Event::SpindleWait => "spindle=wait".to_owned(),
+        Event::Programmed(block) => format!("programmed={}", block.motion.word()),
     }
 }

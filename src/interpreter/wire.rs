@@ -481,6 +481,8 @@ pub enum Event {
     SpindlePosition(Arc<SpindlePositioning>),
     /// The path rests until the master spindle is at its speed or position.
     SpindleWait,
+    /// What the program asks of the path from here on (smoothing makes it of a motion block, for recordings).
+    Programmed(Arc<ProgrammedBlock>),
 }
 
 /// Where the master spindle is sent.
@@ -505,4 +507,49 @@ pub enum SpindleApproach {
     Negative,
     /// IC: by this way, from where it stands or comes to rest.
     By,
+}
+
+impl Event {
+    /// It only tells what the program says: nothing depends on it.
+    pub fn only_tells(&self) -> bool {
+        matches!(self, Self::Programmed(_))
+    }
+}
+
+/// The contour of one block as the program asks for it: RND and CHF are in it, blends and the compressor are not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProgrammedBlock {
+    /// Where it comes from.
+    pub block: BlockRef,
+    /// How it is driven.
+    pub motion: ProgrammedMotion,
+    /// Points of all axes from start to end, without the length of the tool; straight in between, to 0.02 um.
+    pub points: Vec<PartPoint>,
+    /// Position of the axes minus position of the tip.
+    pub tool_length: AxisVector,
+}
+
+/// How the points of a [`ProgrammedBlock`] are driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProgrammedMotion {
+    /// G0.
+    Rapid,
+    /// G1.
+    Line,
+    /// A curve: the points in between are none of the program.
+    Curve,
+    /// Every axis on its own: there is no contour in between.
+    Positioning,
+}
+
+impl ProgrammedMotion {
+    /// As recordings have it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Rapid => "rapid",
+            Self::Line => "line",
+            Self::Curve => "curve",
+            Self::Positioning => "positioning",
+        }
+    }
 }

@@ -13,7 +13,7 @@ use super::inner_rows::InnerRows;
 use super::preparation::{Findings, PieceSource, Preparation};
 use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
-use crate::drive::{AxisSignals, Drive, DriveInput, IdealDrive, SpindleLag, SpindleSignals, Start};
+use crate::drive::{AxisSignals, Drive, DriveBatch, DriveInput, IdealDrive, SpindleLag, SpindleSignals, Start};
 use crate::feed::{Limit, LimitKind};
 use crate::interpolator::{AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint};
 use crate::interpreter::{ExactStop, Setup};
@@ -84,6 +84,15 @@ impl PositionCycle {
     }
 }
 
+/// What the axes get at a row's tick, and what their drives say to it.
+#[derive(Clone)]
+struct Step {
+    sent: PerAxis<AxisSetpoint>,
+    /// `None`: the position cycle of the axis does not begin at this tick.
+    inputs: PerAxis<Option<DriveInput>>,
+    signals: PerAxis<AxisSignals>,
+}
+
 /// A set-point sampled ahead, with the pieces that begin on the way to it.
 #[derive(Clone)]
 struct Sampled {
@@ -107,7 +116,8 @@ pub struct Kernel<S = Preparation> {
     resting: Option<ExactStopWait>,
     /// An axis gives more than one row a position cycle.
     sorts_rows: bool,
-    drives: Vec<Drive>,
+    drives: DriveBatch<Drive>,
+    step: Step,
     in_position: InPositionWire,
     clamping: Clamping,
     spindle: SpindleLag,
@@ -168,7 +178,8 @@ impl<S: PieceSource> Kernel<S> {
             until_rest: false,
             resting: None,
             sorts_rows: false,
-            drives: stages,
+            drives: DriveBatch::new(stages),
+            step: Step { sent: PerAxis::default(), inputs: PerAxis::splat(None), signals: PerAxis::default() },
             in_position,
             clamping: Clamping::new(&machine),
             spindle: SpindleLag::new(
@@ -199,7 +210,7 @@ impl<S: PieceSource> Kernel<S> {
 
     /// With rows of every axis at the rate of its speed or current loop. Figures count position ticks in any case.
     pub fn with_rows_at(mut self, rate: RecordRate) -> Self {
-        let drives = self.machine.axes.iter().zip(&self.drives);
+        let drives = self.machine.axes.iter().zip(self.drives.drives());
         for (cycle, (axis, drive)) in self.position_cycles.iter_mut().zip(drives) {
             let driven = matches!(drive, Drive::Cascade(_));
             cycle.rows = InnerRows::new(axis.drive.as_ref().filter(|_| driven), rate);
@@ -282,32 +293,25 @@ impl<S: PieceSource> Kernel<S> {
         let next = self.ahead.setpoint.unwrap_or(*setpoint);
         let ticks = if last { 1 } else { self.machine.cycle.time_base.ticks_per_setpoint() };
         for offset in (0..ticks).step_by(self.row_ticks as usize) {
+            let tick = Tick(setpoint.tick.0 + offset);
+            self.send(setpoint, &next, offset);
+            if self.sorts_rows && !last {
+                self.step_with_rows(tick);
+            } else {
+                let Self { drives, step, .. } = self;
+                let (inputs, signals) = (step.inputs.as_slice(), step.signals.as_mut_slice());
+                drives.step_some(|place| inputs.get(place).copied().flatten(), |place, now| signals[place] = *now);
+            }
             for axis in self.machine.axis_ids() {
-                let cycle = &self.position_cycles[axis.index()];
-                if !offset.is_multiple_of(cycle.ticks) {
+                if self.step.inputs[axis].is_none() {
                     continue;
                 }
-                let sent = cycle.fine.at(&setpoint.axes[axis], &next.axes[axis], offset / cycle.ticks);
-                let input = DriveInput {
-                    position_setpoint_lu: sent.position_lu,
-                    load_n_m: 0.0,
-                    feedforward_active: setpoint.feedforward_active,
-                };
-                let drive = &mut self.drives[axis.index()];
-                let tick = Tick(setpoint.tick.0 + offset);
-                let row = |tick, signals| AxisRow { tick, axis, setpoint: sent, signals };
-                let signals = match last {
-                    true => drive.step(input),
-                    false => {
-                        let rows = &mut self.output.rows;
-                        cycle.rows.step(drive, input, tick, |tick, signals| rows.push(row(tick, signals)))
-                    }
-                };
-                if !drive.is_finite() {
+                let (setpoint_sent, signals) = (self.step.sent[axis], self.step.signals[axis]);
+                if !self.drives.drives()[axis.index()].is_finite() {
                     return Err(diverged(&self.machine, axis, tick));
                 }
                 self.figures.drive(axis, &signals);
-                let row = row(tick, signals);
+                let row = AxisRow { tick, axis, setpoint: setpoint_sent, signals };
                 self.output.rows.push(row);
                 if let Some(wait) = &wait {
                     self.in_position.hear(tick, axis, wait, &signals);
@@ -322,6 +326,37 @@ impl<S: PieceSource> Kernel<S> {
         Ok(())
     }
 
+    /// What the axes get `offset` ticks behind `setpoint`.
+    fn send(&mut self, setpoint: &Setpoint, next: &Setpoint, offset: u64) {
+        for axis in self.machine.axis_ids() {
+            let cycle = &self.position_cycles[axis.index()];
+            if !offset.is_multiple_of(cycle.ticks) {
+                self.step.inputs[axis] = None;
+                continue;
+            }
+            let sent = cycle.fine.at(&setpoint.axes[axis], &next.axes[axis], offset / cycle.ticks);
+            self.step.sent[axis] = sent;
+            self.step.inputs[axis] = Some(DriveInput {
+                position_setpoint_lu: sent.position_lu,
+                load_n_m: 0.0,
+                feedforward_active: setpoint.feedforward_active,
+            });
+        }
+    }
+
+    /// Every drive alone, with the rows between its position ticks.
+    fn step_with_rows(&mut self, tick: Tick) {
+        let Self { drives, step, position_cycles, output, .. } = self;
+        for ((axis, cycle), drive) in self.machine.axis_ids().zip(position_cycles).zip(drives.drives_mut()) {
+            let (setpoint, rows) = (step.sent[axis], &mut output.rows);
+            if let Some(input) = step.inputs[axis] {
+                step.signals[axis] = cycle
+                    .rows
+                    .step(drive, input, tick, |tick, signals| rows.push(AxisRow { tick, axis, setpoint, signals }));
+            }
+        }
+    }
+
     /// Tool poses and contour error at the set-point.
     fn measure(&mut self, setpoint: &Setpoint) {
         let sent = MachinePoint(PerAxis::from_fn(|axis| setpoint.axes[axis].position_lu));
@@ -332,14 +367,14 @@ impl<S: PieceSource> Kernel<S> {
         self.output.tool_setpoint = self.kinematics.tip_pose(&sent, &setpoint.tool_length);
         self.output.tool_actual = self.kinematics.tip_pose(&actual, &setpoint.tool_length);
         self.contour_error.push(self.output.tool_setpoint.position_mm);
-        if self.drives.iter().any(|drive| matches!(drive, Drive::Cascade(_))) {
+        if self.drives.drives().iter().any(|drive| matches!(drive, Drive::Cascade(_))) {
             self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
         }
     }
 
     /// The drives, for [`braking`](super::braking).
     pub(super) fn drives_mut(&mut self) -> &mut [Drive] {
-        &mut self.drives
+        self.drives.drives_mut()
     }
 
     /// Ticks between rows.

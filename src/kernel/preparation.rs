@@ -88,6 +88,11 @@ impl Preparation {
         Self { planner: self.planner.waiting_in_position(driven), ..self }
     }
 
+    /// With an `Event::Programmed` for every motion block: what the program asks of the path, for a recording.
+    pub fn telling_programmed(self) -> Self {
+        Self { smoother: self.smoother.telling_programmed(), ..self }
+    }
+
     /// Keeps the moves, for those who want to plan them again.
     pub(super) fn keeping_moves(self) -> Self {
         Self { moves: Some(Vec::new()), ..self }

@@ -92,6 +92,7 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
     let preparation = Preparation::new(options.setup.clone(), &machine)
         .with_overrides(&options.overrides)
         .waiting_in_position(options.drives);
+    let preparation = if options.recording.is_some() { preparation.telling_programmed() } else { preparation };
     if options.threads > 1 {
         let source = PreparationThread::spawn(preparation)
             .map_err(|error| RunError(Diagnostic::error("K0001", format!("no thread for preparation: {error}"))))?;
@@ -176,6 +177,7 @@ fn open_recorder(options: &RunOptions<'_>, machine: &Arc<Machine>) -> Result<Opt
     setup.mantissa_bits = options.mantissa_bits;
     setup.signals = options.signals;
     setup.decimation = options.signals.decimation();
+    setup.programmed = true;
     Recorder::to_file(path, &setup).map(Some).map_err(RunError)
 }
 

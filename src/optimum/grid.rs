@@ -5,6 +5,7 @@
 //! to the way of the first jerk, which is no interval. Does not know the speed.
 
 use super::collect::Piece;
+use super::profile::Used;
 use crate::base::AxisId;
 use crate::feed::PieceRules;
 use crate::geometry::Curve;
@@ -37,6 +38,9 @@ pub(super) fn inside(ratio: f64) -> f64 {
     ratio.clamp(INSIDE_RATIO, 1.0 - INSIDE_RATIO)
 }
 
+/// The least that [`Share`] leaves.
+const SHARE_MIN_RATIO: f64 = 0.3;
+
 /// What does not move an axis: less than this per unit of s.
 const STILL_RATIO: f64 = 1e-14;
 
@@ -53,6 +57,30 @@ pub(super) struct Interval {
     pub points: [PathPoint; 3],
     /// Highest v² half-way between these, where a cubic would else wave about a constant speed.
     pub square_max_between: [f64; 2],
+    /// What may be used of the limits here: less where a motion exceeded them between the places.
+    pub share: Share,
+}
+
+/// Shares of limits, all 1 to begin with.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Share {
+    pub square_ratio: f64,
+    pub acceleration_ratio: f64,
+    pub jerk_ratio: f64,
+}
+
+impl Share {
+    const WHOLE: Self = Self { square_ratio: 1.0, acceleration_ratio: 1.0, jerk_ratio: 1.0 };
+
+    /// Less by what is used beyond the limits.
+    fn without(self, used: &Used) -> Self {
+        let less = |share: f64, used_ratio: f64| (share / used_ratio.max(1.0)).max(SHARE_MIN_RATIO);
+        Self {
+            square_ratio: less(self.square_ratio, used.velocity_ratio * used.velocity_ratio),
+            acceleration_ratio: less(self.acceleration_ratio, used.acceleration_ratio),
+            jerk_ratio: less(self.jerk_ratio, used.jerk_ratio),
+        }
+    }
 }
 
 /// The path at a place, in shares of what the axes allow.
@@ -128,6 +156,14 @@ impl PathPoint {
         Self { square_max, accelerations, jerks }
     }
 
+    /// The same with less of the limits.
+    fn within(mut self, share: Share) -> Self {
+        self.square_max *= share.square_ratio;
+        self.accelerations.as_flattened_mut().iter_mut().for_each(|demand| *demand /= share.acceleration_ratio);
+        self.jerks.as_flattened_mut().iter_mut().for_each(|demand| *demand /= share.jerk_ratio);
+        self
+    }
+
     /// Largest share of an acceleration limit that is used.
     pub(super) fn acceleration_ratio(&self, square: f64, slope: f64) -> f64 {
         self.accelerations.iter().map(|[d1, d2]| (d2 * square + d1 * slope / 2.0).abs()).fold(0.0, f64::max)
@@ -167,7 +203,7 @@ impl Grid {
                         steps if steps <= 1.0 => left_lu,
                         _ => step_lu.min(left_lu / 2.0),
                     };
-                    intervals.push(Interval::new(pieces, index, at_lu, start_lu, length_lu));
+                    intervals.push(Interval::new(pieces, index, [at_lu, start_lu, length_lu], Share::WHOLE));
                     at_lu = if length_lu == left_lu { to_lu } else { at_lu + length_lu };
                 }
             }
@@ -212,19 +248,34 @@ impl Grid {
             let half_lu = interval.length_lu / 2.0;
             let start_lu = interval.place_lu - interval.from_lu;
             for from_lu in [interval.from_lu, interval.from_lu + half_lu] {
-                intervals.push(Interval::new(pieces, interval.piece, from_lu, start_lu, half_lu));
+                intervals.push(Interval::new(pieces, interval.piece, [from_lu, start_lu, half_lu], interval.share));
             }
         }
         Self::joined(pieces, intervals, self.rests)
     }
+
+    /// The same, with less of the limits where a motion uses more than there is; `None` where it uses no more than `allowed_ratio`.
+    pub(super) fn tightened(&self, pieces: &[Piece], used: &[Used], allowed_ratio: f64) -> Option<Self> {
+        if used.iter().all(|used| used.largest() <= allowed_ratio) {
+            return None;
+        }
+        let tighter = |(interval, used): (&Interval, &Used)| {
+            let Interval { piece, from_lu, place_lu, length_lu, .. } = *interval;
+            let share = interval.share.without(used);
+            Interval::new(pieces, piece, [from_lu, place_lu - from_lu, length_lu], share)
+        };
+        Some(Self::joined(pieces, self.intervals.iter().zip(used).map(tighter).collect(), self.rests))
+    }
 }
 
 impl Interval {
-    fn new(pieces: &[Piece], index: usize, from_lu: f64, start_lu: f64, length_lu: f64) -> Self {
+    /// Where it begins in its piece, where the piece begins, and how long it is.
+    fn new(pieces: &[Piece], index: usize, [from_lu, start_lu, length_lu]: [f64; 3], share: Share) -> Self {
         let piece = &pieces[index];
-        let points = POINTS_RATIO.map(|ratio| piece.point(from_lu + inside(ratio) * length_lu));
-        let square_max_between = BETWEEN_RATIO.map(|ratio| piece.point(from_lu + ratio * length_lu).square_max);
-        Self { piece: index, from_lu, place_lu: start_lu + from_lu, length_lu, points, square_max_between }
+        let points = POINTS_RATIO.map(|ratio| piece.point(from_lu + inside(ratio) * length_lu).within(share));
+        let square_max_between =
+            BETWEEN_RATIO.map(|ratio| share.square_ratio * piece.point(from_lu + ratio * length_lu).square_max);
+        Self { piece: index, from_lu, place_lu: start_lu + from_lu, length_lu, points, square_max_between, share }
     }
 }
 

@@ -16,8 +16,9 @@
 //! which is below it, so that every round's result keeps the true limit; the rounds end where they gain nothing. A grid whose intervals
 //! leave limits unused is refined (`section`). At a rest b goes with s^(4/3), a motion of constant jerk from v = a = 0.
 //!
-//! The limits hold at both ends and in the middle of every interval; what is missed between them is measured on a finer sampling, and
-//! the whole motion is slowed by as much as that takes (a fraction of a percent), so that the time is one in which the limits hold.
+//! The limits hold at both ends and in the middle of every interval; what is missed between them is measured on a finer sampling. Where they
+//! are exceeded there, the interval is solved again with less of them, and at last the whole motion is slowed by the little that is left, so
+//! that the time is one in which the limits hold. Where the control is faster than that, its motion is the fastest that is known.
 //!
 //! Does not know how the control plans. Motions of single axes beside the path (POS) and dwells take the time that they took.
 

@@ -65,8 +65,11 @@ pub(super) fn solve(grid: &Grid, before: &Profile, far: bool) -> Option<Profile>
             jerks(&mut problem, point, &at, square, &row);
         }
         for (ratio, square_max) in BETWEEN_RATIO.into_iter().zip(interval.square_max_between) {
+            let at = weights(ratio, interval.length_lu)[0];
+            let unit = before.squares[index].max(before.squares[index + 1]);
+            let least = SLOWER_MIN_RATIO * square_at(grid, before, index, ratio);
+            problem.at_most(&scale.row(index, at.map(|w| -w / unit)), -least / unit);
             if square_max.is_finite() {
-                let at = weights(ratio, interval.length_lu)[0];
                 problem.at_most(&scale.row(index, at.map(|w| w / square_max)), 1.0);
             }
         }

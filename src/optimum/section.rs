@@ -8,17 +8,21 @@ use super::collect::{Part, Piece};
 use super::grid::{Grid, Interval};
 use super::profile::{Profile, Used};
 use super::{NoOptimum, OptimalMotion, Optimum, SpeedPlace, round};
+use std::sync::Arc;
 
 /// Pieces between two rests that are solved at once; more ask for more memory and time than the figure is worth.
 const PIECES_MAX: usize = 5000;
 
-/// Rounds end where one gains less than this share of the time. On a refined grid a few are enough: it begins near its optimum.
+/// Rounds end where one gains less than this share of the time.
 const ROUND_GAIN_RATIO: f64 = 1e-4;
-const FIRST_ROUNDS_MAX: usize = 20;
+const ROUNDS_MAX: usize = 20;
+
+/// On a refined grid a few are enough, unless they still gain more than this: it begins near its optimum.
+const FEW_ROUNDS: usize = 4;
+const FEW_GAIN_RATIO: f64 = 2e-3;
 
 /// Rounds at first that look for more speed wherever there is some to gain, whatever the time says: the first motion may be far too slow.
 const FAR_ROUNDS: usize = 6;
-const ROUNDS_MAX: usize = 4;
 
 /// Grids end where one gains less than this share of the time.
 const GRID_GAIN_RATIO: f64 = 3e-4;
@@ -28,6 +32,17 @@ const GRIDS_MAX: usize = 9;
 const UNUSED_RATIO: f64 = 0.97;
 const EXCEEDED_RATIO: f64 = 1.003;
 const EXCEEDED_VELOCITY_RATIO: f64 = 1.0005;
+
+/// Intervals whose limits are exceeded between the places are solved again with less of them; so often, and if by more than this.
+const TIGHTENINGS_MAX: usize = 4;
+const ALLOWED_RATIO: f64 = 1.0003;
+
+/// The control's motion is taken where it is faster by more than this share; so many places of each of its phases.
+const DRIVEN_GAIN_RATIO: f64 = 1e-3;
+const PHASE_PLACES: usize = 8;
+
+/// Where b comes out negative it begins again at this share of the least beside it.
+const DIP_RATIO: f64 = 0.1;
 
 /// Places of an interval at which the result is looked at.
 const CHECKED_PLACES: usize = 16;
@@ -65,6 +80,8 @@ struct Section<'a> {
     profile: Profile,
     /// The profile may be much slower than the optimum.
     far: bool,
+    /// The last finer grid gained next to nothing.
+    converged: bool,
 }
 
 impl<'a> Section<'a> {
@@ -85,51 +102,93 @@ impl<'a> Section<'a> {
                 (profile, time_s, far) = (candidate, candidate_s, is_far);
             }
         }
-        Self { pieces, grid, profile, far }
+        Self { pieces, grid, profile, far, converged: false }
     }
 
     fn solved(mut self, optimum: &mut Optimum, progress: &mut dyn FnMut()) -> Result<OptimalMotion, NoOptimum> {
         let mut grid_s = f64::INFINITY;
         for number in 0..GRIDS_MAX {
-            let slow_ratio = self.profile.stretch_ratio(&self.grid);
-            self.profile = self.profile.slowed(slow_ratio);
-            let mut time_s = self.profile.time_s(&self.grid);
-            if !time_s.is_finite() {
+            let coarser = (self.grid.clone(), self.profile.clone());
+            if number > 0 {
+                let cut = self.to_cut(self.converged);
+                if !cut.contains(&true) {
+                    break;
+                }
+                self.refine(&cut);
+            }
+            let Some(time_s) = self.rounds(number == 0, &mut optimum.rounds, progress) else {
+                if number > 0 {
+                    (self.grid, self.profile) = coarser;
+                    break;
+                }
                 let line = self.pieces.first().map_or(0, |piece| piece.path.contour.block.line);
                 return Err(NoOptimum::NotSolved { line });
-            }
-            for count in 0..if number == 0 { FIRST_ROUNDS_MAX } else { ROUNDS_MAX } {
-                progress();
-                optimum.rounds += 1;
-                let far = self.far && number == 0 && count < FAR_ROUNDS;
-                let Some(next) = round::solve(&self.grid, &self.profile, far) else { break };
-                // What the solver was left with may be a little off.
-                let slow_ratio = next.stretch_ratio(&self.grid);
-                let next = next.slowed(slow_ratio);
-                let next_s = next.time_s(&self.grid);
-                let faster = next_s < time_s;
-                if !faster {
-                    break;
-                }
-                self.profile = next;
-                let gained = time_s - next_s;
-                time_s = next_s;
-                if !far && gained <= ROUND_GAIN_RATIO * time_s {
-                    break;
-                }
-            }
-            let gained = grid_s - time_s;
+            };
+            self.converged = (grid_s - time_s).abs() <= GRID_GAIN_RATIO * time_s;
             grid_s = time_s;
-            let converged = gained.abs() <= GRID_GAIN_RATIO * time_s;
-            let cut = self.to_cut(converged);
-            if !cut.contains(&true) {
+        }
+        let mut best = self.slowed_everywhere();
+        for _ in 0..TIGHTENINGS_MAX {
+            let Some(grid) = self.grid.tightened(self.pieces, &self.used(), ALLOWED_RATIO) else { break };
+            self.grid = grid;
+            if self.rounds(false, &mut optimum.rounds, progress).is_none() {
                 break;
             }
-            self.profile = self.profile.refined(&self.grid, &cut);
-            self.grid = self.grid.refined(self.pieces, &cut);
+            let next = self.slowed_everywhere();
+            if next.1 < best.1 {
+                best = next;
+            }
         }
         optimum.grid_points += self.grid.intervals.len() + 1;
-        Ok(self.motion())
+        Ok(self.motion(best))
+    }
+
+    /// Some intervals cut in two.
+    fn refine(&mut self, cut: &[bool]) {
+        self.profile = self.profile.refined(&self.grid, cut);
+        self.grid = self.grid.refined(self.pieces, cut);
+        if self.profile.stretch_ratio(&self.grid).is_finite() {
+            return;
+        }
+        // A cubic that is positive at its ends and its middle may be negative between them, at a deep dip: there it begins again, slower.
+        let before = &self.profile.squares;
+        let near = |place: usize| before[place.saturating_sub(1)..(place + 2).min(before.len())].iter();
+        let least = |place: usize| near(place).copied().filter(|square| *square > 0.0).fold(f64::INFINITY, f64::min);
+        let squares: Vec<f64> = (0..before.len()).map(|place| before[place].max(DIP_RATIO * least(place))).collect();
+        let slopes = slopes(&self.grid, &squares);
+        self.profile = Profile::new(&self.grid, squares, slopes);
+    }
+
+    /// Rounds on the grid as it is, while they gain; the time. `None` where the motion cannot be slowed into its limits.
+    fn rounds(&mut self, first: bool, rounds: &mut usize, progress: &mut dyn FnMut()) -> Option<f64> {
+        let slow_ratio = self.profile.stretch_ratio(&self.grid);
+        self.profile = self.profile.clone().slowed(slow_ratio);
+        let mut time_s = self.profile.time_s(&self.grid);
+        if !time_s.is_finite() {
+            return None;
+        }
+        for count in 0..ROUNDS_MAX {
+            progress();
+            *rounds += 1;
+            let far = self.far && first && count < FAR_ROUNDS;
+            let Some(next) = round::solve(&self.grid, &self.profile, far) else { break };
+            // What the solver was left with may be a little off.
+            let slow_ratio = next.stretch_ratio(&self.grid);
+            let next = next.slowed(slow_ratio);
+            let next_s = next.time_s(&self.grid);
+            let faster = next_s < time_s;
+            if !faster {
+                break;
+            }
+            self.profile = next;
+            let gained = time_s - next_s;
+            time_s = next_s;
+            let enough = !first && count + 1 >= FEW_ROUNDS && gained <= FEW_GAIN_RATIO * time_s;
+            if !far && (enough || gained <= ROUND_GAIN_RATIO * time_s) {
+                break;
+            }
+        }
+        Some(time_s)
     }
 
     /// Intervals that exceed limits inside, and unless the time has converged those that leave limits unused.
@@ -151,26 +210,56 @@ impl<'a> Section<'a> {
         Used::at(&point, self.profile.at(&self.grid, index, ratio))
     }
 
-    /// The motion, slowed by what it exceeds its limits between the places of the grid.
-    fn motion(self) -> OptimalMotion {
-        let Self { pieces, grid, profile, .. } = self;
-        let used = (0..grid.intervals.len()).map(|index| profile.used(&grid, pieces, index, CHECKED_PLACES));
-        let stretch_ratio = used.fold(Used::default(), Used::most).stretch_ratio();
+    /// What each interval uses of the limits of its machine, at many places.
+    fn used(&self) -> Vec<Used> {
+        let used = |index| self.profile.used(&self.grid, self.pieces, index, CHECKED_PLACES);
+        (0..self.grid.intervals.len()).map(used).collect()
+    }
+
+    /// The motion, slowed by what it exceeds its limits between the places of the grid; its time.
+    fn slowed_everywhere(&self) -> (Profile, f64) {
+        let stretch_ratio = self.used().into_iter().fold(Used::default(), Used::most).stretch_ratio();
+        (self.profile.clone().slowed(stretch_ratio), self.profile.time_s(&self.grid) * stretch_ratio)
+    }
+
+    fn motion(self, (profile, time_s): (Profile, f64)) -> OptimalMotion {
+        let Self { pieces, grid, .. } = self;
+        let path = pieces.iter().map(|piece| piece.path.clone()).collect();
+        let driven = driven_motion(pieces);
+        if driven.time_s < (1.0 - DRIVEN_GAIN_RATIO) * time_s {
+            return OptimalMotion { path, ..driven };
+        }
         let place = |index: usize| {
             let place_lu = match grid.intervals.get(index) {
                 Some(interval) => interval.place_lu,
                 None => grid.intervals.last().map_or(0.0, |last| last.place_lu + last.length_lu),
             };
-            let velocity_lu_s = profile.squares[index].sqrt() / stretch_ratio;
-            let acceleration_lu_s2 = profile.slopes[index] / 2.0 / (stretch_ratio * stretch_ratio);
-            SpeedPlace { place_lu, velocity_lu_s, acceleration_lu_s2 }
+            let velocity_lu_s = profile.squares[index].sqrt();
+            SpeedPlace { place_lu, velocity_lu_s, acceleration_lu_s2: profile.slopes[index] / 2.0 }
         };
-        OptimalMotion {
-            time_s: profile.time_s(&grid) * stretch_ratio,
-            places: (0..profile.squares.len()).map(place).collect(),
-            path: pieces.iter().map(|piece| piece.path.clone()).collect(),
-        }
+        OptimalMotion { time_s, places: (0..profile.squares.len()).map(place).collect(), path }
     }
+}
+
+/// The control's motion, without its path. Parts of a spline that was cut have one law.
+fn driven_motion(pieces: &[Piece]) -> OptimalMotion {
+    let (mut motion, mut start_lu) = (OptimalMotion::default(), 0.0);
+    for (index, Piece { driven: (law, _), .. }) in pieces.iter().enumerate() {
+        if index > 0 && Arc::ptr_eq(law, &pieces[index - 1].driven.0) {
+            continue;
+        }
+        for phase in law.phases() {
+            let places = (1..=PHASE_PLACES).map(|i| phase.at(phase.duration_s * i as f64 / PHASE_PLACES as f64));
+            motion.places.extend(places.filter(|state| state.velocity_lu_s > 0.0).map(|state| SpeedPlace {
+                place_lu: start_lu + state.position_lu,
+                velocity_lu_s: state.velocity_lu_s,
+                acceleration_lu_s2: state.acceleration_lu_s2,
+            }));
+        }
+        motion.time_s += law.duration_s();
+        start_lu += law.phases().last().map_or(0.0, |phase| phase.at(phase.duration_s).position_lu);
+    }
+    motion
 }
 
 /// The motion of the control.

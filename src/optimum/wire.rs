@@ -20,7 +20,7 @@ pub struct Optimum {
 }
 
 /// A motion from rest to rest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct OptimalMotion {
     /// The path, in order.
     pub path: Vec<JointPath>,

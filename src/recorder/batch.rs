@@ -7,7 +7,9 @@ use super::schema::ToolPose;
 use crate::base::{AxisId, Tick};
 use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
+use crate::interpreter::ProgrammedBlock;
 use crate::program::{BlockRef, OpenedProgram};
+use std::sync::Arc;
 
 /// Records in a batch: about two simulated centiseconds of five axes at 1 kHz, so that the channel is touched seldom.
 pub(super) const BATCH_RECORDS: usize = 512;
@@ -45,6 +47,10 @@ pub(super) enum Record {
         block: Option<BlockRef>,
         event: EventRecord,
     },
+    Programmed {
+        tick: Tick,
+        block: Arc<ProgrammedBlock>,
+    },
     Program {
         tick: Tick,
         program: OpenedProgram,
@@ -59,6 +65,7 @@ impl Record {
             | Self::Spindle { tick, .. }
             | Self::Pose { tick, .. }
             | Self::Event { tick, .. }
+            | Self::Programmed { tick, .. }
             | Self::Program { tick, .. } => *tick,
         }
     }

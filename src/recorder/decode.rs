@@ -4,10 +4,11 @@
 //! so that newer recordings stay readable. Does not read files.
 
 use super::schema::proto::foxglove::PoseInFrame;
-use super::schema::proto::sollwert::{Event, Path, Sample, Spindle};
+use super::schema::proto::sollwert::{Event, Path, Programmed, Sample, Spindle};
 use super::schema::{
     AXIS_FIELD_COUNT, AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, MONITORING_FIELD, PATH,
-    PATH_TOPIC, POSE_IN_FRAME, ROTARY_AXIS, SAMPLE, SIGNAL_TOPIC_PREFIX, SPINDLE, SPINDLE_TOPIC, TOOL_TOPICS, ToolPose,
+    PATH_TOPIC, POSE_IN_FRAME, PROGRAMMED, PROGRAMMED_TOPIC, ROTARY_AXIS, SAMPLE, SIGNAL_TOPIC_PREFIX, SPINDLE,
+    SPINDLE_TOPIC, TOOL_TOPICS, ToolPose,
 };
 use crate::base::AxisKind;
 use prost::Message as _;
@@ -29,6 +30,8 @@ pub enum TopicKind {
     Event,
     /// The master spindle.
     Spindle,
+    /// What the program asks of the path.
+    Programmed,
     /// A pose of the tool.
     Pose(ToolPose),
     /// A signal of an imported trace that is none of an axis.
@@ -52,6 +55,7 @@ impl TopicKind {
             (None, PATH_TOPIC) if schema == PATH.name => Self::Path,
             (None, EVENT_TOPIC) if schema == EVENT.name => Self::Event,
             (None, SPINDLE_TOPIC) if schema == SPINDLE.name => Self::Spindle,
+            (None, PROGRAMMED_TOPIC) if schema == PROGRAMMED.name => Self::Programmed,
             (None, topic) if schema == POSE_IN_FRAME.name && topic == TOOL_TOPICS[0] => Self::Pose(ToolPose::Setpoint),
             (None, topic) if schema == POSE_IN_FRAME.name && topic == TOOL_TOPICS[1] => Self::Pose(ToolPose::Actual),
             _ => Self::Other,
@@ -75,6 +79,12 @@ impl AxisSample {
     pub(super) fn decode(mut data: &[u8]) -> Result<Self, prost::DecodeError> {
         let mut sample = Self { values: [0.0; AXIS_FIELD_COUNT], present: 0 };
         while !data.is_empty() {
+            if let Some((field, value, rest)) = double_field(data) {
+                sample.values[field] = value;
+                sample.present |= 1 << field;
+                data = rest;
+                continue;
+            }
             let (tag, wire) = decode_key(&mut data)?;
             let field = tag as usize - 1;
             let value = match (field, wire) {
@@ -82,13 +92,6 @@ impl AxisSample {
                     let mut bits = 0_u32;
                     prost::encoding::uint32::merge(wire, &mut bits, &mut data, DecodeContext::default())?;
                     f64::from(bits)
-                }
-                (field, WireType::SixtyFourBit)
-                    if field < AXIS_FIELD_COUNT && !matches!(field, FLAGS_FIELD | MONITORING_FIELD) =>
-                {
-                    let mut value = 0.0;
-                    prost::encoding::double::merge(wire, &mut value, &mut data, DecodeContext::default())?;
-                    value
                 }
                 _ => {
                     skip_field(wire, tag, &mut data, DecodeContext::default())?;
@@ -102,6 +105,22 @@ impl AxisSample {
     }
 }
 
+/// A field of wire type 1 that this program writes, at the beginning of `data`: its place, its value, what follows. In one piece: this is most of
+/// what a recording is made of. `None`: anything else, or too few bytes, which the general way tells.
+#[inline]
+fn double_field(data: &[u8]) -> Option<(usize, f64, &[u8])> {
+    let (first, rest) = data.split_first()?;
+    let (key, rest) = match (*first, rest) {
+        (low @ 0..=0x7f, rest) => (u32::from(low), rest),
+        (low, [high @ 0..=0x7f, rest @ ..]) => (u32::from(low & 0x7f) | u32::from(*high) << 7, rest),
+        _ => return None,
+    };
+    let field = (key >> 3).checked_sub(1)? as usize;
+    let known = key & 7 == 1 && field < AXIS_FIELD_COUNT && !matches!(field, FLAGS_FIELD | MONITORING_FIELD);
+    let (bytes, rest) = rest.split_first_chunk().filter(|_| known)?;
+    Some((field, f64::from_le_bytes(*bytes), rest))
+}
+
 /// A decoded message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
@@ -113,6 +132,8 @@ pub enum Content {
     Event(Box<Event>),
     /// The master spindle.
     Spindle(Box<Spindle>),
+    /// What the program asks of the path.
+    Programmed(Box<Programmed>),
     /// A pose of the tool, in metres.
     Pose(ToolPose, Box<PoseInFrame>),
     /// A sample of a signal of an imported trace.
@@ -128,6 +149,7 @@ impl Content {
             TopicKind::Path => Self::Path(Box::new(Path::decode(data)?)),
             TopicKind::Event => Self::Event(Box::new(Event::decode(data)?)),
             TopicKind::Spindle => Self::Spindle(Box::new(Spindle::decode(data)?)),
+            TopicKind::Programmed => Self::Programmed(Box::new(Programmed::decode(data)?)),
             TopicKind::Pose(which) => Self::Pose(*which, Box::new(PoseInFrame::decode(data)?)),
             TopicKind::Signal { .. } => Self::Sample(Sample::decode(data)?),
             TopicKind::Other => Self::Other(data.to_vec()),

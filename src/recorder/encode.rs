@@ -7,12 +7,13 @@ use super::batch::Record;
 use super::event::EventRecord;
 use super::schema::proto::foxglove::{Pose, PoseInFrame, Quaternion, Vector3};
 use super::schema::proto::google::protobuf::Timestamp;
-use super::schema::proto::sollwert::{Event, Path, Spindle};
+use super::schema::proto::sollwert::{Event, Path, Programmed, Spindle};
 use super::schema::{AXIS_FIELDS, FLAGS_FIELD, FieldUnit, MONITORING_FIELD, POSE_FRAME};
 use crate::base::units::{MM_PER_M, NS_PER_S, deg_from_rad, mm_min_from_mm_s, rot_from_rad, rpm_from_rad_s};
-use crate::base::{AxisKind, PerAxis};
+use crate::base::{AxisKind, AxisVector, PerAxis};
 use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
+use crate::interpreter::ProgrammedBlock;
 use crate::machine::Machine;
 use crate::program::{BlockRef, ProgramId};
 use prost::Message;
@@ -105,6 +106,8 @@ fn push_double(tag: u32, value: f64, buffer: &mut Vec<u8>) {
 #[derive(Clone, Debug)]
 pub(super) struct RunEncoder {
     axis_names: PerAxis<Arc<str>>,
+    /// In the machine's order.
+    axis_kinds: Vec<AxisKind>,
     programs: Vec<(ProgramId, Arc<str>)>,
     precision: Precision,
     path: Path,
@@ -117,6 +120,7 @@ impl RunEncoder {
         let pose = PoseInFrame { frame_id: Some(POSE_FRAME.to_owned()), ..PoseInFrame::default() };
         Self {
             axis_names: PerAxis::from_fn(|axis| Arc::from(name(axis.index()))),
+            axis_kinds: machine.axes.iter().map(|axis| axis.kind).collect(),
             programs: Vec::new(),
             precision,
             path: Path::default(),
@@ -141,6 +145,7 @@ impl RunEncoder {
                 let message = self.event_message(*block, event);
                 message.encode_raw(buffer);
             }
+            Record::Programmed { block, .. } => self.programmed_message(block).encode_raw(buffer),
             Record::Axis { .. } | Record::Program { .. } => {}
         }
     }
@@ -198,6 +203,26 @@ impl RunEncoder {
             orientation: Some(Quaternion { x: qx, y: qy, z: qz, w: qw }),
         });
         self.pose.encode_raw(buffer);
+    }
+
+    fn programmed_message(&self, block: &ProgrammedBlock) -> Programmed {
+        let values = |vector: &AxisVector| -> Vec<f64> {
+            let axes = self.axis_kinds.iter().zip(vector.as_slice());
+            let shown = axes.map(|(kind, value_lu)| match kind {
+                AxisKind::Linear => *value_lu,
+                AxisKind::Rotary => deg_from_rad(*value_lu),
+            });
+            shown.map(|value| self.precision.round(value)).collect()
+        };
+        let without_tool = block.tool_length.as_slice().iter().all(|length| *length == 0.0);
+        Programmed {
+            program: self.program_name(block.block.program).map(|name| name.to_string()),
+            block: Some(block.block.number),
+            line: Some(block.block.line),
+            motion: Some(block.motion.word().to_owned()),
+            points: block.points.iter().flat_map(|point| values(&point.0)).collect(),
+            tool_length_mm: if without_tool { Vec::new() } else { values(&block.tool_length) },
+        }
     }
 
     fn event_message(&self, block: Option<BlockRef>, event: &EventRecord) -> Event {

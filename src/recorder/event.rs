@@ -74,9 +74,11 @@ impl From<&Event> for EventRecord {
             Event::Spindle(text) => Self::Spindle(text.clone()),
             Event::SpindlePosition(positioning) => Self::Spindle(positioning.text.clone()),
             // The axes, the override and the spindle themselves are on record.
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {
-                Self::BlockStart
-            }
+            Event::Position(_)
+            | Event::Synchronised(_)
+            | Event::CancelSynchronised(_)
+            | Event::SpindleWait
+            | Event::Programmed(_) => Self::BlockStart,
         }
     }
 }

@@ -62,18 +62,17 @@ impl Recorder {
             let message = format!("--record-precision {bits} is out of range: an f64 has 52 mantissa bits");
             return Err(Diagnostic::error("R0021", message).help("give 1 to 52; 36 keep 7e-9 mm in 1000 mm"));
         }
-        let writer = RecordingWriter::create(target, name.clone(), setup)?;
+        let fault: Fault = Arc::new(OnceLock::new());
+        let writer = RecordingWriter::create(target, name.clone(), setup, fault.clone())?;
         let (orders, orders_out) = bounded(BATCHES);
         let (returned_in, returned) = bounded(BATCHES);
         for _ in 1..BATCHES {
             // Never full: it holds all batches there are.
             let _ = returned_in.try_send(Batch::empty());
         }
-        let fault: Fault = Arc::new(OnceLock::new());
-        let thread_fault = fault.clone();
         let thread = std::thread::Builder::new()
             .name("recorder".to_owned())
-            .spawn(move || writer.run(&orders_out, &returned_in, &thread_fault))
+            .spawn(move || writer.run(&orders_out, &returned_in))
             .map_err(|error| Diagnostic::error("R0002", format!("the recorder's thread does not start: {error}")))?;
         let signals = setup.signals.on(setup.machine);
         let time_base = setup.machine.cycle.time_base;
@@ -140,13 +139,12 @@ impl Recorder {
         if let Event::ProgramOpened(program) = event {
             self.attach_program(tick, program);
         }
-        let silent = match event {
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => true,
-            Event::SpindlePosition(positioning) => positioning.text.is_empty(),
-            _ => false,
-        };
-        if !silent {
-            self.event(tick, Some(block), event.into());
+        match event {
+            Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {}
+            // M19 is an event of its own.
+            Event::SpindlePosition(positioning) if positioning.text.is_empty() => {}
+            _ => self.event(tick, Some(block), event.into()),
         }
     }
 

@@ -11,6 +11,8 @@ mod encode;
 mod event;
 mod export;
 mod front;
+mod mcap_file;
+mod packing;
 mod reader;
 mod records;
 mod recover;

@@ -21,6 +21,8 @@ pub const PATH_TOPIC: &str = "/path";
 pub const EVENT_TOPIC: &str = "/event";
 /// Topic of the master spindle, where the machine file has `[spindle]`.
 pub const SPINDLE_TOPIC: &str = "/spindle";
+/// Topic of what the program asks for.
+pub const PROGRAMMED_TOPIC: &str = "/programmed";
 /// Topics of the tool poses, by [`ToolPose`].
 pub const TOOL_TOPICS: [&str; 2] = ["/tool/setpoint", "/tool/actual"];
 /// What the topics of the axes begin with; the name of the axis follows.
@@ -71,6 +73,11 @@ pub const EVENT: SchemaText =
 /// Schema of the master spindle.
 pub const SPINDLE: SchemaText =
     SchemaText { name: "sollwert.Spindle", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/spindle.fds")) };
+/// Schema of what the program asks for.
+pub const PROGRAMMED: SchemaText = SchemaText {
+    name: "sollwert.Programmed",
+    descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/programmed.fds")),
+};
 /// Schema of the signals of imported traces that are none of an axis.
 pub const SAMPLE: SchemaText =
     SchemaText { name: "sollwert.Sample", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/sample.fds")) };

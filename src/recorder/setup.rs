@@ -57,6 +57,8 @@ pub struct RecordingSetup<'a> {
     pub mantissa_bits: Option<u8>,
     /// Record every n-th sample of each axis and of the path; the last one is recorded in any case.
     pub decimation: NonZeroU32,
+    /// With a topic for what the program asks of the path.
+    pub programmed: bool,
     /// Packing of chunks.
     pub compression: Compression,
 }
@@ -77,6 +79,7 @@ impl<'a> RecordingSetup<'a> {
             signals: SignalChoice::all(),
             mantissa_bits: None,
             decimation: NonZeroU32::MIN,
+            programmed: false,
             compression: Compression::Zstd,
         }
     }

@@ -195,7 +195,7 @@ impl Sheet<'_> {
             return path_json(&PathSource { track: &own.track, matches: Some(&own.contour.matches), against, trace });
         }
         let machine = machine_of(trace);
-        match track(trace, machine.as_ref(), &ACTUAL_STEMS) {
+        match track(trace, machine.as_ref(), &ACTUAL_STEMS, true) {
             Some(track) => path_json(&PathSource { track: &track, matches: None, against: String::new(), trace }),
             None => Value::Null,
         }

@@ -3,8 +3,11 @@
 //! In: the figures of a run, one side of a comparison, a comparison. Out: HTML with every text escaped. Does not compute figures.
 
 use super::encode::escape;
-use crate::base::units::{MS_PER_S, UM_PER_MM, US_PER_S, percent_from_ratio};
-use crate::compare::{Comparison, Figures, LineTimes, PairFigures, Side};
+use crate::base::units::{MS_PER_S, US_PER_S, percent_from_ratio};
+use crate::compare::{
+    Comparison, Figures, LineTimes, PairFigures, Side, arcs_remark, budget_rows, circle_rows, corner_rows, line_rows,
+    pair_rows, significant, um,
+};
 use serde_json::Value;
 use std::fmt::Write as _;
 
@@ -26,15 +29,6 @@ pub fn table(caption: &str, rows: &[Vec<String>]) -> String {
         html += "</tr>";
     }
     html + "</table></figure>"
-}
-
-/// Three significant digits.
-pub fn significant(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let digits = (2 - value.abs().log10().floor() as i64).clamp(0, 9) as usize;
-    if value.abs() < 1e-7 { format!("{value:.2e}") } else { format!("{value:.digits$}") }
 }
 
 fn row(cells: &[&str]) -> Vec<String> {
@@ -102,10 +96,6 @@ fn unit(suffix: &str) -> String {
     suffix.replacen("_s", "/s", 1).replace("s2", "s²").replace("s3", "s³")
 }
 
-fn um(value_mm: f64) -> String {
-    format!("{} µm", significant(value_mm * UM_PER_MM))
-}
-
 fn contour_row(name: String, figures: &Figures) -> Vec<String> {
     let at = format!("{:.3} s", figures.max_at_s);
     vec![name, um(figures.rms), um(figures.max), at, um(figures.p95), um(figures.bias)]
@@ -129,57 +119,24 @@ pub fn side_tables(side: &Side, whose: &str) -> String {
 
 fn budget_table(side: &Side, whose: &str) -> String {
     let Some(budget) = &side.budget else { return String::new() };
-    let parts =
-        [("chords of the program", &budget.chord), ("interpolator", &budget.interpolator), ("drives", &budget.drives)];
-    let mut rows = vec![row(&["error", "rms", "max", "p95", "worst NC lines"])];
-    for (name, part) in parts {
-        let Some(part) = part else { continue };
-        let um = |value_um: f64| format!("{} µm", significant(value_um));
-        let worst =
-            part.worst.iter().take(5).map(|((_, line), error_um)| format!("{line} ({})", significant(*error_um)));
-        let f = &part.figures;
-        rows.push(vec![name.to_owned(), um(f.rms), um(f.max), um(f.p95), worst.collect::<Vec<_>>().join(", ")]);
-    }
-    table(&format!("Where the error comes from{whose}"), &rows)
+    let against = if budget.program_of_other { ", against the program of the other file" } else { "" };
+    let html = table(&format!("Where the error comes from{whose}{against}"), &budget_rows(budget));
+    let missing = budget.missing.iter().map(|note| format!("<p class=\"remark\">{}</p>", escape(&note.message)));
+    html + &missing.collect::<String>()
 }
 
 fn circle_table(side: &Side, whose: &str) -> String {
     let Some(own) = &side.own else { return String::new() };
-    let mut rows =
-        vec![row(&["circle", "R", "G", "G(b)", "F max", "F min", "F mean", "peaks behind 0, 90, 180, 270°"])];
-    for circle in own.features.circles.iter().take(ROWS_MAX) {
-        let um = |value_um: f64| format!("{value_um:.2} µm");
-        let way = if circle.counter_clockwise { "ccw" } else { "cw" };
-        let peaks = circle.quadrant_peaks_um.map(|peak| peak.map_or("–".to_owned(), |peak| format!("{peak:.2}")));
-        rows.push(vec![
-            format!("{} {way}, {:.3} s", circle.plane.concat(), circle.start_s),
-            format!("{:.3} mm", circle.radius_mm),
-            um(circle.deviation_um),
-            circle.bidirectional_um.map_or("–".to_owned(), um),
-            um(circle.radial_max_um),
-            um(circle.radial_min_um),
-            um(circle.radial_mean_um),
-            format!("{} µm", peaks.join(", ")),
-        ]);
-    }
-    table(&format!("Circles (ISO 230-4){whose}"), &rows)
+    let html = table(&format!("Circles (ISO 230-4){whose}"), &circle_rows(&own.features.circles, ROWS_MAX));
+    let remark = arcs_remark(&own.features).map(|remark| format!("<p class=\"remark\">{}</p>", escape(&remark)));
+    html + &remark.unwrap_or_default()
 }
 
 fn corner_table(side: &Side, whose: &str) -> String {
     let Some(own) = &side.own else { return String::new() };
-    let mut worst: Vec<_> = own.features.corners.iter().collect();
-    worst.sort_by(|a, b| b.overshoot_um.total_cmp(&a.overshoot_um).then(a.time_s.total_cmp(&b.time_s)));
-    let mut rows = vec![row(&["corner at", "angle", "overshoot", "cut", "X Y Z"])];
-    for corner in worst.iter().take(ROWS_MAX) {
-        rows.push(vec![
-            format!("{:.3} s", corner.time_s),
-            format!("{:.1}°", corner.angle_deg),
-            format!("{:.2} µm", corner.overshoot_um),
-            format!("{:.2} µm", corner.cut_um),
-            corner.point_mm.map(|x| format!("{x:.3}")).join(" "),
-        ]);
-    }
-    table(&format!("Corners that are overshot most, {} in all{whose}", worst.len()), &rows)
+    let corners = &own.features.corners;
+    let caption = format!("Corners that are overshot most, {} in all{whose}", corners.len());
+    table(&caption, &corner_rows(corners, ROWS_MAX))
 }
 
 /// Everything that a comparison says.
@@ -222,34 +179,9 @@ pub fn comparison_tables(comparison: &Comparison) -> String {
 }
 
 fn pair_table(caption: &str, pairs: &[PairFigures], get: impl Fn(&PairFigures) -> Option<&Figures>) -> String {
-    let mut rows = vec![row(&["signal", "rms", "max", "at", "p95", "bias", "correlation", "delay", "unit"])];
-    for pair in pairs {
-        let Some(figures) = get(pair) else { continue };
-        rows.push(vec![
-            pair.name.clone(),
-            significant(figures.rms),
-            significant(figures.max),
-            format!("{:.3} s", figures.max_at_s),
-            significant(figures.p95),
-            significant(figures.bias),
-            figures.correlation_ratio.map_or(String::new(), |r| format!("{r:.5}")),
-            pair.delay_s.map_or(String::new(), |(delay_s, _)| format!("{:.3} ms", delay_s * MS_PER_S)),
-            pair.unit.clone(),
-        ]);
-    }
-    table(caption, &rows)
+    table(caption, &pair_rows(pairs, get, &|time_s| format!("{time_s:.3} s")))
 }
 
 fn line_table(lines: &[LineTimes]) -> String {
-    let mut rows = vec![row(&["NC line", "trace", "reference", "difference", "contour error max"])];
-    for line in lines.iter().filter(|line| (line.trace_s - line.reference_s).abs() > 5e-4).take(ROWS_MAX) {
-        rows.push(vec![
-            format!("{} {}", line.program, line.line),
-            format!("{:.3} s", line.trace_s),
-            format!("{:.3} s", line.reference_s),
-            format!("{:+.3} s", line.trace_s - line.reference_s),
-            um(line.contour_error_max_mm),
-        ]);
-    }
-    table("NC lines whose time differs most", &rows)
+    table("NC lines whose time differs most", &line_rows(lines, ROWS_MAX))
 }

@@ -6,6 +6,7 @@ mod compressor;
 mod corner;
 mod dynamics;
 mod insert;
+mod programmed;
 mod smoother;
 mod transition;
 mod unrounded;

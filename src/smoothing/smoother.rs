@@ -14,6 +14,7 @@
 use super::compressor::Compression;
 use super::corner::{Junction, Rules, Side};
 use super::insert::{Inserted, Omitted, inserted};
+use super::programmed::{positioned, programmed};
 use super::unrounded::{Reason, Unrounded};
 use super::{ContourPiece, PieceKind};
 use crate::base::diagnostics::Place;
@@ -42,6 +43,8 @@ pub struct Smoother {
     positioned: PerAxis<bool>,
     /// The block that did so last: what the wait at the end belongs to where nothing else is left.
     sent_away: Option<Head>,
+    /// Every motion block tells what the program asks for.
+    tells_programmed: bool,
 }
 
 /// The motion block whose end is not decided yet.
@@ -95,7 +98,13 @@ impl Smoother {
             unrounded: Unrounded::default(),
             positioned: PerAxis::splat(false),
             sent_away: None,
+            tells_programmed: false,
         }
+    }
+
+    /// With an [`Event::Programmed`] for every motion block. Nothing else changes.
+    pub fn telling_programmed(self) -> Self {
+        Self { tells_programmed: true, ..self }
     }
 
     /// Takes the next move; hands over the pieces that it decides.
@@ -170,6 +179,7 @@ impl Smoother {
 
     /// The path goes on where the axes will arrive: what is missing on the way is added to the path by feed and interpolator.
     fn push_positioning(&mut self, next: Move, axes: std::sync::Arc<[AxisPositioning]>) {
+        let from = self.position;
         for axis in axes.iter() {
             self.positioned[axis.axis] = true;
             self.position.0[axis.axis] = axis.end_lu;
@@ -181,6 +191,9 @@ impl Smoother {
         let start = Event::Position(std::sync::Arc::new(Positioning { axes, programmed }));
         let mut events = next.events.clone();
         events.push(start);
+        if self.tells_programmed {
+            events.push(positioned(&next, [from, self.position]));
+        }
         self.carry(Move { events, ..next }, 1);
     }
 
@@ -293,7 +306,10 @@ impl Smoother {
     }
 
     /// The next block, through the compressor.
-    fn compress(&mut self, block: Held, out: &mut impl FnMut(ContourPiece)) {
+    fn compress(&mut self, mut block: Held, out: &mut impl FnMut(ContourPiece)) {
+        if self.tells_programmed {
+            block.head.events.push(programmed(&block.curve, &block.head));
+        }
         if self.compression.passes(&block) {
             self.link(block, out);
             return;

@@ -9,7 +9,7 @@ use super::faults::Faults;
 use super::import::{About, ImportOptions};
 use super::naming::Naming;
 use super::sink::Sink;
-use super::source::{PartReader, Source, unreadable};
+use super::source::{PartReader, Source};
 use super::time_column::TimeColumn;
 use super::wire::{Origin, TraceFormat};
 use crate::base::Diagnostic;
@@ -31,8 +31,9 @@ pub(super) fn read_csv(
     let mut starts = Vec::new();
     while first_lines.len() < LOOK_AHEAD_LINES {
         let mut line = String::new();
-        starts.push(reader.consumed());
-        if !reader.line(&mut line).map_err(|error| unreadable(&shown, &error))? {
+        let at = reader.consumed();
+        starts.push(at);
+        if !reader.line(&mut line).map_err(|error| source.unreadable_at(part, at, &error))? {
             break;
         }
         first_lines.push(line);
@@ -91,7 +92,7 @@ impl Reading<'_> {
         let mut line = String::new();
         loop {
             let at = reader.consumed();
-            if !reader.line(&mut line).map_err(|error| unreadable(&shown, &error))? {
+            if !reader.line(&mut line).map_err(|error| self.source.unreadable_at(self.part, at, &error))? {
                 break;
             }
             rows.take(&line, at)?;

@@ -1,10 +1,13 @@
 //! SINUMERIK Edge / Data Recorder JSON -> rows and events.
 //!
 //! In: Header, Payload, Footer, in one file or in a chain of files (a folder, a zip). Out: one row a position cycle for a [`Sink`], the
-//! block starts as events, and `path.line`. Time is the counter of position cycles times its period (`CycleTimeMs`, or as the time
-//! stamps say); a cycle that is missing is a gap. Streams: memory holds one row and one event. LF and external data are passed over.
+//! block starts as events, `path.line`, and the numbers of LFData, each held until the next. Time is the counter of position cycles times its
+//! period (`CycleTimeMs`, or as the time stamps say); a cycle that is missing is a gap. Streams: memory holds one row, one event and what of
+//! LFData waits for its row. A low-frequency value whose row has passed comes with the next one, and how late is said. Texts of LFData,
+//! calls and external data are passed over.
 
 use super::columns::taken_apart;
+use super::edge_low::LowSignals;
 use super::edge_payload::{Element, Payload, period_by_stamps};
 use super::faults::Faults;
 use super::import::{About, ImportOptions};
@@ -37,6 +40,7 @@ pub(super) fn read_edge(source: &Source, options: &ImportOptions, sink: &mut dyn
         names: Vec::new(),
         line_column: 0,
         line: f64::NAN,
+        low: LowSignals::default(),
         cycle_column: None,
         period_s: USUAL_PERIOD_S,
         first: None,
@@ -66,6 +70,7 @@ struct Recorder<'s> {
     names: Vec<String>,
     line_column: usize,
     line: f64,
+    low: LowSignals,
     cycle_column: Option<usize>,
     period_s: f64,
     /// Counter of the first row, and what is to be added to counters since they wrapped.
@@ -95,9 +100,10 @@ impl Recorder<'_> {
                 Some(Element::Header(header)) => self.header(part, &header)?,
                 Some(Element::Row(row)) => self.row(&row)?,
                 Some(Element::Block(block)) => self.block(&block)?,
+                Some(Element::Low(values)) => self.low.take(&values, &mut self.faults),
                 Some(Element::Other(sort)) => {
                     if sort != "HFTimestamp" {
-                        self.faults.count("T0008", "low-frequency, call and external data are passed over", 0);
+                        self.faults.count("T0008", "call and external data are passed over", 0);
                     }
                 }
                 None => break,
@@ -166,6 +172,8 @@ impl Recorder<'_> {
             layout: Layout::Dense,
             ..Head::default()
         });
+        let low = self.low.begin(header, heads.len(), &mut self.naming);
+        heads.extend(low);
         self.sink.begin(&heads)
     }
 
@@ -248,12 +256,14 @@ impl Recorder<'_> {
             }
         }
         self.cells.push((self.line_column, self.line));
+        let counter = counter.unwrap_or(count as f64);
+        self.low.hand_over(counter, &mut self.cells);
         self.rows += 1;
         self.sink.row(self.time_s(count), &self.cells)
     }
 
     fn block(&mut self, block: &Value) -> Result<(), Diagnostic> {
-        let counter = block.get("HFProbeCounter").and_then(Value::as_i64);
+        let counter = block.get("HFProbeCounter").or_else(|| block.get("HfProbeCounter")).and_then(Value::as_i64);
         let line = block.get("SeekOffset").and_then(Value::as_u64).and_then(|line| u32::try_from(line).ok());
         let Some(counter) = counter else { return Ok(()) };
         // The last event of a file stands again at the beginning of the next.
@@ -279,6 +289,13 @@ impl Recorder<'_> {
         }
         let mut notes = std::mem::take(&mut self.naming.notes);
         notes.extend(self.faults.findings(|code, message, _| Diagnostic::warning(code, message)));
+        notes.extend(self.low.late_by().map(|cycles| {
+            let late_ms = cycles as f64 * self.period_s * MS_PER_S;
+            Diagnostic::note(
+                "T0009",
+                format!("values of LFData came up to {late_ms:.0} ms after their time, and stand there"),
+            )
+        }));
         let start_utc = self.metadata.get("start").cloned();
         let format = TraceFormat::EdgeJson;
         Ok(About {

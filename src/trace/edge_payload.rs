@@ -23,6 +23,8 @@ pub(super) enum Element {
     Row(Vec<f64>),
     /// HFBlockEvent.
     Block(Value),
+    /// LFData.
+    Low(Value),
     /// Anything else, by its key.
     Other(String),
 }
@@ -158,7 +160,8 @@ impl<R: BufRead> Payload<R> {
                         Ok(None)
                     }
                     "HFBlockEvent" => Ok(Some(Element::Block(self.value()?))),
-                    "HFTimestamp" => Ok(Some(Element::Other(self.stamp()?))),
+                    "LFData" => Ok(Some(Element::Low(self.value()?))),
+                    "HFTimestamp" | "HfTimestamp" => Ok(Some(Element::Other(self.stamp()?))),
                     _ => {
                         self.skip()?;
                         Ok(Some(Element::Other(key)))
@@ -367,12 +370,13 @@ impl<R: BufRead> Stamps<R> {
                     b'"' => {
                         let key = self.scanner.string().ok()?;
                         self.scanner.expect(b':').ok()?;
-                        if key != "HFTimestamp" {
+                        if key != "HFTimestamp" && key != "HfTimestamp" {
                             self.scanner.skip().ok()?;
                             continue;
                         }
                         let stamp = self.scanner.value().ok()?;
-                        let counter = stamp.get("HFProbeCounter").and_then(Value::as_f64);
+                        let counter = stamp.get("HFProbeCounter").or_else(|| stamp.get("HfProbeCounter"));
+                        let counter = counter.and_then(Value::as_f64);
                         let time = stamp.get("Time").and_then(Value::as_str).and_then(super::instants::instant_s);
                         if let Some(stamp) = counter.zip(time) {
                             return Some(stamp);

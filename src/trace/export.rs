@@ -12,7 +12,7 @@ use super::sink::{Head, Sink};
 use super::source::Source;
 use super::table::Table;
 use super::to_recording::ToRecording;
-use super::wire::{Origin, TraceFormat};
+use super::wire::{Origin, Signal, Trace, TraceFormat};
 use crate::base::Diagnostic;
 use crate::recorder::{Recording, Target, WholeFile};
 use std::io::{self, BufWriter, Write};
@@ -109,6 +109,9 @@ pub fn export_trace(
     let source = Source::open(input, options.progress)?;
     let format = source.format()?;
     let from_recording = format == TraceFormat::Recording;
+    if from_recording {
+        source.refuse_packed()?;
+    }
     let everything = names == ColumnNames::Original && options.only.is_empty();
     if from_recording && form == ExportForm::Recording {
         let message = format!("{} is a recording already", source.shown);
@@ -170,9 +173,29 @@ impl Job<'_> {
 
     /// A choice of signals: through memory.
     fn chosen(&self, sink: &mut dyn Sink) -> Result<About, Diagnostic> {
-        let trace = import(self.input, self.options)?;
+        let trace = self.imported()?;
         stream_trace(&trace, sink)?;
         Ok(About { origin: trace.origin, metadata: trace.metadata, notes: trace.notes })
+    }
+
+    /// The trace with the signals that are asked for; a name that is none of its signals is said.
+    fn imported(&self) -> Result<Trace, Diagnostic> {
+        let mut trace = import(self.input, self.options)?;
+        let is_there = |name: &String| {
+            let has = |signal: &Signal| signal.axis_signal().is_some_and(|own| own.stem() == name);
+            trace.signals.iter().any(|signal| signal.is_named(name) || has(signal))
+        };
+        let missing: Vec<&str> = self.options.only.iter().filter(|name| !is_there(name)).map(String::as_str).collect();
+        if missing.is_empty() {
+            return Ok(trace);
+        }
+        let message = format!("{} has no signal {}", self.source.shown, missing.join(", "));
+        let help = "the names are those of the columns of a whole export, ours, or a field such as following_error";
+        if trace.signals.is_empty() {
+            return Err(Diagnostic::error("T0019", message).help(help));
+        }
+        trace.notes.push(Diagnostic::warning("T0019", message).help(help));
+        Ok(trace)
     }
 
     fn table(&self, target: Target, names: ColumnNames) -> Done {
@@ -205,7 +228,7 @@ impl Job<'_> {
     }
 
     fn operate(&self, target: Target) -> Done {
-        let trace = import(self.input, self.options)?;
+        let trace = self.imported()?;
         let mut buffered = BufWriter::with_capacity(256 * 1024, target);
         let mut notes = trace.notes.clone();
         let written = write_operate(&trace, self.options, &mut buffered, &mut notes)?;

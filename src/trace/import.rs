@@ -8,9 +8,10 @@ use super::edge::read_edge;
 use super::measuring::read_measuring;
 use super::operate::read_operate;
 use super::recording::import_recording;
-use super::scope::{read_halsampler, read_halscope, read_twincat};
+use super::scope::{read_halsampler, read_halscope};
 use super::sink::{Memory, Sink};
 use super::source::{Progress, Source};
+use super::twincat::read_twincat;
 use super::wire::{AxisSignal, Origin, Trace, TraceFormat};
 use crate::base::Diagnostic;
 use crate::machine::Machine;
@@ -32,6 +33,8 @@ pub struct ImportOptions<'a> {
     /// Signals to keep, by any of their names or by field without axis (`position_setpoint`); empty keeps all. A long recording
     /// with all its signals does not fit into memory.
     pub only: Vec<String>,
+    /// Keep what the program asks of the path as well, of a recording.
+    pub programmed: bool,
     /// Told how far the reading is.
     pub progress: Progress<'a>,
 }
@@ -60,6 +63,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Trace, Diagnostic>
     let source = Source::open(path, options.progress)?;
     let format = source.format()?;
     if format == TraceFormat::Recording {
+        source.refuse_packed()?;
         return import_recording(&Recording::open(path)?, options);
     }
     let mut memory = Memory::new(&options.only);
@@ -93,8 +97,8 @@ pub(super) fn read_rows(
         TraceFormat::Halsampler => read_halsampler(source, 0, options, sink)?,
         TraceFormat::MeasuringXml => read_measuring(source, 0, options, sink)?,
         TraceFormat::Recording => {
-            let message = format!("{} is a recording in an archive", source.shown);
-            return Err(Diagnostic::error("T0018", message).help("unpack it, and name the recording"));
+            let message = format!("{} is a recording, which is not read row by row", source.shown);
+            return Err(Diagnostic::error("T0018", message).help("name the recording itself"));
         }
     };
     if source.part_count() > 1 && format != TraceFormat::EdgeJson {

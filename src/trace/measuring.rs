@@ -1,12 +1,15 @@
 //! XML of measuring functions and auto servo tuning, with its base-85 arrays -> rows.
 //!
 //! In: serialised objects: `<float name="...">` and `<NumericArray format="base85"><raw name="m_pNumberArray">`. Out: one signal an array, two
-//! of a complex one, at `m_dProcessUpdateTime` from value to value; numbers with names as metadata. Frequency responses have no time:
-//! their points are counted, and a note says so. Memory: the arrays.
+//! of a complex one; numbers with names as metadata. From value to value it is `m_TimeVector.end` of the same object over the number of steps, else
+//! `m_dProcessUpdateTime`. Values beside an `m_FrequencyVector` of half their number are complex. Frequency responses have no time: their points are
+//! counted, and a note says so. Memory: all arrays, because they stand one behind the other and become columns: at most
+//! 20 million values (160 MB), an array of at most 64 MB of text.
 
+use super::faults::TIME_MAX_S;
 use super::import::{About, ImportOptions};
 use super::sink::{Head, Layout, Sink};
-use super::source::{Source, unreadable};
+use super::source::Source;
 use super::wire::{Meaning, Origin, TraceFormat};
 use crate::base::Diagnostic;
 use quick_xml::Reader;
@@ -21,15 +24,26 @@ const DEPTH_MAX: usize = 200;
 const ARRAYS_MAX: usize = 1000;
 const NUMBERS_MAX: usize = 10_000;
 /// Values of all arrays.
-const VALUES_MAX: usize = 50_000_000;
+const VALUES_MAX: usize = 20_000_000;
+/// A shorter period is none.
+const LEAST_PERIOD_S: f64 = 1e-9;
 /// Period where the file gives none: the usual current-controller cycle.
 const USUAL_PERIOD_S: f64 = 125e-6;
+
+/// Time of the last value of a time series.
+const TIME_END: &str = "m_TimeVector.end";
+/// Frequencies of a response.
+const FREQUENCIES: &str = "m_FrequencyVector";
 
 /// An array of the file.
 struct Array {
     name: String,
+    /// Number of the object that it is part of.
+    object: usize,
     values: Vec<f64>,
     complex: bool,
+    /// From value to value.
+    period_s: f64,
 }
 
 /// Reads all arrays into a sink.
@@ -39,7 +53,7 @@ pub(super) fn read_measuring(
     _: &ImportOptions,
     sink: &mut dyn Sink,
 ) -> Result<About, Diagnostic> {
-    let mut walk = Walk { source, part, path: Vec::new(), arrays: Vec::new(), numbers: BTreeMap::new(), values: 0 };
+    let mut walk = Walk { source, part, ..Walk::new(source) };
     let complete = walk.run()?;
     let mut notes = Vec::new();
     if !complete {
@@ -52,8 +66,9 @@ pub(super) fn read_measuring(
     }
     let given = walk.numbers.get(UPDATE_TIME).and_then(|text| text.parse::<f64>().ok());
     let period_s = given.filter(|period_s| *period_s > 0.0 && period_s.is_finite()).unwrap_or(USUAL_PERIOD_S);
-    if given.is_none() {
-        let message = format!("no {UPDATE_TIME} in the file: {period_s} s is assumed");
+    let assumed = walk.settle(period_s);
+    if given.is_none() && assumed {
+        let message = format!("neither {UPDATE_TIME} nor {TIME_END} in the file: {period_s} s is assumed");
         notes.push(Diagnostic::warning("T0012", message));
     }
     if walk.arrays.iter().any(|array| array.complex) {
@@ -61,7 +76,7 @@ pub(super) fn read_measuring(
             "complex arrays are frequency responses: their points are counted, `time_s` means nothing for them";
         notes.push(Diagnostic::note("T0012", message));
     }
-    hand_over(&walk.arrays, period_s, sink)?;
+    hand_over(&walk.arrays, sink)?;
     let format = TraceFormat::MeasuringXml;
     Ok(About {
         origin: Origin { format, description: format.title().to_owned(), start_utc: None },
@@ -70,60 +85,117 @@ pub(super) fn read_measuring(
     })
 }
 
-/// Arrays as columns: a shorter one ends earlier.
-fn hand_over(arrays: &[Array], period_s: f64, sink: &mut dyn Sink) -> Result<(), Diagnostic> {
+/// Arrays as columns, each at its own period: a shorter one ends earlier.
+fn hand_over(arrays: &[Array], sink: &mut dyn Sink) -> Result<(), Diagnostic> {
     let mut heads = Vec::new();
+    let mut first_columns = Vec::new();
     for array in arrays {
         let parts: &[&str] = if array.complex { &[".re", ".im"] } else { &[""] };
+        first_columns.push(heads.len());
         for part in parts {
             let remark = if array.complex { "frequency response: its points are counted" } else { "" };
             heads.push(Head {
                 original: format!("{}{part}", array.name),
                 layout: Layout::Own,
-                period_s: Some(period_s),
+                period_s: Some(array.period_s),
                 meaning: Meaning { remark: remark.to_owned(), ..Meaning::default() },
                 ..Head::default()
             });
         }
     }
     sink.begin(&heads)?;
-    let width = |array: &Array| if array.complex { 2 } else { 1 };
-    let rows = arrays.iter().map(|array| array.values.len() / width(array)).max().unwrap_or(0);
+    let mut next = vec![0_usize; arrays.len()];
     let mut row = Vec::new();
-    for k in 0..rows {
+    loop {
+        let due = arrays.iter().zip(&next).filter(|(array, k)| **k < array.points());
+        let Some(now_s) = due.map(|(array, k)| array.time_s(*k)).min_by(f64::total_cmp) else { return Ok(()) };
         row.clear();
-        let mut column = 0;
-        for array in arrays {
-            let width = width(array);
-            for part in 0..width {
-                if let Some(value) =
-                    array.values.get(k * width + part).filter(|_| (k + 1) * width <= array.values.len())
-                {
-                    row.push((column + part, *value));
-                }
+        for ((array, k), first) in arrays.iter().zip(&mut next).zip(&first_columns) {
+            if *k < array.points() && array.time_s(*k) == now_s {
+                let width = array.width();
+                row.extend((0..width).map(|part| (first + part, array.values[*k * width + part])));
+                *k += 1;
             }
-            column += width;
         }
-        sink.row(k as f64 * period_s, &row)?;
+        sink.row(now_s, &row)?;
     }
-    Ok(())
+}
+
+impl Array {
+    fn width(&self) -> usize {
+        if self.complex { 2 } else { 1 }
+    }
+
+    fn points(&self) -> usize {
+        self.values.len() / self.width()
+    }
+
+    fn time_s(&self, k: usize) -> f64 {
+        k as f64 * self.period_s
+    }
 }
 
 struct Walk<'a> {
     source: &'a Source<'a>,
     part: usize,
-    /// Tag and name of the open elements, and whether they say that their numbers are complex.
-    path: Vec<(String, String, bool)>,
+    /// The open elements.
+    path: Vec<Element>,
+    /// Elements so far.
+    elements: usize,
     arrays: Vec<Array>,
     numbers: BTreeMap<String, String>,
+    /// Ends of time series, by the number of their object.
+    ends_s: BTreeMap<usize, f64>,
     values: usize,
 }
 
-impl Walk<'_> {
+/// An open element.
+struct Element {
+    number: usize,
+    tag: String,
+    name: String,
+    /// It says that its numbers are complex.
+    complex: bool,
+}
+
+impl<'a> Walk<'a> {
+    fn new(source: &'a Source<'a>) -> Self {
+        Self {
+            source,
+            part: 0,
+            path: Vec::new(),
+            elements: 0,
+            arrays: Vec::new(),
+            numbers: BTreeMap::new(),
+            ends_s: BTreeMap::new(),
+            values: 0,
+        }
+    }
+
+    /// Periods of all arrays, and which values are pairs. Whether the usual period had to be taken for any.
+    fn settle(&mut self, usual_s: f64) -> bool {
+        let frequencies = |array: &Array| array.name.ends_with(FREQUENCIES);
+        let responses: BTreeMap<usize, usize> =
+            self.arrays.iter().filter(|array| frequencies(array)).map(|array| (array.object, array.points())).collect();
+        let mut assumed = false;
+        for array in &mut self.arrays {
+            let of_response = responses.get(&array.object);
+            array.complex |= of_response.is_some_and(|points| *points > 0 && array.values.len() == 2 * points);
+            let steps = array.points().saturating_sub(1);
+            let end_s = self
+                .ends_s
+                .get(&array.object)
+                .filter(|end_s| steps > 0 && **end_s < TIME_MAX_S && **end_s > LEAST_PERIOD_S * steps as f64);
+            assumed |= end_s.is_none() && of_response.is_none();
+            array.period_s = end_s.map_or(usual_s, |end_s| end_s / steps as f64);
+        }
+        assumed
+    }
+
     /// Whether the file ends in good order.
     fn run(&mut self) -> Result<bool, Diagnostic> {
         // The text of an array is one item: megabytes are usual.
-        let mut reader = Reader::from_reader(self.source.read(self.part)?.with_item_limit(256 << 20));
+        let mut reader = Reader::from_reader(self.source.read(self.part)?.with_item_limit(64 << 20));
         reader.config_mut().check_end_names = false;
         reader.config_mut().allow_unmatched_ends = true;
         let mut buffer = Vec::new();
@@ -144,7 +216,7 @@ impl Walk<'_> {
                 Ok(Event::Eof) => return Ok(self.path.is_empty()),
                 Ok(_) => {}
                 Err(quick_xml::Error::Io(error)) => {
-                    return Err(self.at(unreadable(self.source.part_name(self.part), &error), at));
+                    return Err(self.source.unreadable_at(self.part, at, &error));
                 }
                 Err(_) if !self.arrays.is_empty() => return Ok(false),
                 Err(error) => {
@@ -173,14 +245,22 @@ impl Walk<'_> {
             found.map(|attribute| attribute.value.to_string()).unwrap_or_default()
         };
         let complex = attribute("elementtype").to_lowercase().contains("complex");
-        self.path.push((tag.name().as_ref().to_owned(), attribute("name"), complex));
+        self.elements += 1;
+        let (tag, name) = (tag.name().as_ref().to_owned(), attribute("name"));
+        self.path.push(Element { number: self.elements, tag, name, complex });
         Ok(())
     }
 
     fn text(&mut self, text: &str, at: u64) -> Result<(), Diagnostic> {
         let text = text.trim();
-        let Some((tag, name, _)) = self.path.last().filter(|_| !text.is_empty()) else { return Ok(()) };
+        let Some(Element { tag, name, .. }) = self.path.last().filter(|_| !text.is_empty()) else { return Ok(()) };
+        // The object around a number; around the array around the raw text.
+        let around = |levels: usize| self.path.iter().rev().nth(levels).map_or(0, |element| element.number);
         if tag != "raw" {
+            if name == TIME_END && self.ends_s.len() < NUMBERS_MAX {
+                let end_s = text.parse().ok().filter(|end_s: &f64| end_s.is_finite());
+                self.ends_s.extend(end_s.map(|end_s| (around(1), end_s)));
+            }
             if !name.is_empty() && text.len() < 200 && self.numbers.len() < NUMBERS_MAX {
                 self.numbers.entry(name.clone()).or_insert_with(|| text.to_owned());
             }
@@ -195,14 +275,15 @@ impl Walk<'_> {
             let message = format!("more than {ARRAYS_MAX} arrays or {VALUES_MAX} values");
             return Err(self.at(Diagnostic::error("T0017", message), at));
         }
-        let names = self.path.iter().map(|(_, name, _)| name.as_str());
+        let object = around(2);
+        let names = self.path.iter().map(|element| element.name.as_str());
         let names: Vec<&str> = names.filter(|name| !name.is_empty() && *name != "m_pNumberArray").collect();
-        let complex = self.path.iter().any(|(_, _, complex)| *complex);
+        let complex = self.path.iter().any(|element| element.complex);
         let mut name = if names.is_empty() { "array".to_owned() } else { names.join(".") };
         if self.arrays.iter().any(|array| array.name == name) {
             name = format!("{name} ({})", self.arrays.len() + 1);
         }
-        self.arrays.push(Array { name, values, complex });
+        self.arrays.push(Array { name, object, values, complex, period_s: USUAL_PERIOD_S });
         Ok(())
     }
 }

@@ -9,7 +9,7 @@ use super::instants::instant_s;
 use super::naming::{NamedHead, Naming, operate_name};
 use super::operate_frame::{Declared, Frame};
 use super::sink::{Layout, Memory, Sink};
-use super::source::{PartReader, Source, unreadable};
+use super::source::{PartReader, Source};
 use super::wire::{Clock, Origin, TraceFormat};
 use crate::base::Diagnostic;
 use quick_xml::Reader;
@@ -133,7 +133,7 @@ impl<'s, 'o> Session<'s, 'o> {
         error: &quick_xml::Error,
     ) -> Result<bool, Diagnostic> {
         if let quick_xml::Error::Io(error) = error {
-            return Err(self.at(unreadable(self.source.part_name(self.part), error), at, "here"));
+            return Err(self.source.unreadable_at(self.part, at, error));
         }
         let at_end = std::io::BufRead::fill_buf(reader.get_mut()).is_ok_and(|left| left.is_empty());
         if at_end && self.rows > 0 {

@@ -4,15 +4,17 @@
 //! Tool poses stay in the recording. Memory: 8 bytes a value; `only` keeps what is asked for.
 
 use super::import::ImportOptions;
+use super::programmed::ProgrammedPath;
 use super::sink::{Head, Layout};
 use super::source::Progress;
 use super::wire::{Clock, Meaning, Origin, Signal, TimeGrid, Trace, TraceEvent, TraceFormat, Zero};
 use crate::base::units::NS_PER_S;
-use crate::base::{AxisKind, Diagnostic};
+use crate::base::{AXES_MAX, AxisKind, Diagnostic};
 use crate::recorder::schema::proto::sollwert::{Path as PathMessage, Sample};
 use crate::recorder::schema::{FLAGS_FIELD, MONITORING_FIELD, SIGNAL_TOPIC_PREFIX};
 use crate::recorder::{
-    ABOUT_METADATA, AXIS_FIELDS, AxisSample, Content, Message, PATH_FIELDS, Recording, TopicKind, UNITS_METADATA,
+    ABOUT_METADATA, AXES_METADATA, AXIS_FIELDS, AxisSample, Content, Message, PATH_FIELDS, Recording, TopicKind,
+    UNITS_METADATA,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -27,6 +29,7 @@ pub fn import_recording(recording: &Recording, options: &ImportOptions) -> Resul
     let mut tracks: Vec<Option<Track>> =
         recording.topics().iter().map(|topic| Track::new(&topic.kind, &topic.fields, options)).collect();
     let mut events = Vec::new();
+    let mut programmed = ProgrammedPath::new(machine_axes(recording));
     let total = recording.message_count();
     for (done, message) in (0_u64..).zip(recording.messages()?) {
         let Message { topic, time_ns, content, .. } = message?;
@@ -38,6 +41,9 @@ pub fn import_recording(recording: &Recording, options: &ImportOptions) -> Resul
             (Content::Axis(sample), Some(track)) => track.push_axis(time_ns, &sample),
             (Content::Path(path), Some(track)) => track.push_path(time_ns, &path),
             (Content::Sample(sample), Some(track)) => track.push_sample(time_ns, &sample),
+            (Content::Programmed(message), _) if options.programmed => {
+                programmed.push(time_ns as f64 / NS_PER_S, &message);
+            }
             (Content::Event(event), _) => events.push(TraceEvent { time_s: time_ns as f64 / NS_PER_S, event: *event }),
             _ => {}
         }
@@ -56,11 +62,23 @@ pub fn import_recording(recording: &Recording, options: &ImportOptions) -> Resul
         signals,
         events,
         programs: recording.programs()?,
+        programmed,
         machine: recording.machine_text()?,
         metadata: metadata(recording),
         summary: recording.summary(),
         notes: Vec::new(),
     })
+}
+
+/// Axes of the machine in its order, with their kinds.
+fn machine_axes(recording: &Recording) -> Vec<(String, AxisKind)> {
+    let Some(axes) = recording.metadata(AXES_METADATA) else { return Vec::new() };
+    let kind = |name: &str| match axes.get(&format!("{name}.kind")).map(String::as_str) {
+        Some("rotary") => AxisKind::Rotary,
+        _ => AxisKind::Linear,
+    };
+    let order = axes.get("order").map_or("", String::as_str);
+    order.split(',').filter(|name| !name.is_empty()).take(AXES_MAX).map(|name| (name.to_owned(), kind(name))).collect()
 }
 
 fn metadata(recording: &Recording) -> BTreeMap<String, BTreeMap<String, String>> {

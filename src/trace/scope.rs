@@ -1,47 +1,44 @@
-//! TwinCAT Scope CSV, LinuxCNC halscope and halsampler -> rows.
+//! LinuxCNC halscope and halsampler -> rows.
 //!
-//! In: a text. Out: heads and rows for a [`Sink`]. TwinCAT writes pairs of time and value, channel by channel, each on its own grid; the
-//! channels are merged in memory. halscope says its period; halsampler does not: `--time SECONDS` gives it, 1 ms is assumed else.
+//! In: a text. Out: heads and rows for a [`Sink`]. halscope says its period; halsampler does not: `--time SECONDS` gives it, 1 ms is assumed
+//! else. Streams: memory holds one row.
 
 use super::columns::named_head;
 use super::delimited::{cells, number};
-use super::faults::{Faults, TIME_MAX_S};
+use super::faults::Faults;
 use super::import::{About, ImportOptions};
 use super::naming::{NamedHead, Naming};
-use super::sink::{Head, Layout, Sink};
-use super::source::{PartReader, Source, unreadable};
+use super::sink::{Head, Sink};
+use super::source::{PartReader, Source};
 use super::wire::{Clock, Origin, TraceFormat};
 use crate::base::Diagnostic;
-use crate::base::units::{MS_PER_S, NS_PER_S};
-use std::collections::BTreeMap;
+use crate::base::units::NS_PER_S;
 
-/// Lines of a head.
-const HEAD_LINES_MAX: usize = 200;
 /// The usual servo thread of LinuxCNC.
 const SERVO_THREAD_S: f64 = 0.001;
-/// Samples of all channels of a TwinCAT file.
-const SAMPLES_MAX: usize = 200_000_000;
 
-struct Lines<'a> {
+/// A text line by line.
+pub(super) struct Lines<'a> {
     source: &'a Source<'a>,
     part: usize,
     reader: PartReader<'a>,
-    line: String,
-    at: u64,
+    pub(super) line: String,
+    /// Byte at which the line begins.
+    pub(super) at: u64,
 }
 
 impl<'a> Lines<'a> {
-    fn new(source: &'a Source<'a>, part: usize) -> Result<Self, Diagnostic> {
+    pub(super) fn new(source: &'a Source<'a>, part: usize) -> Result<Self, Diagnostic> {
         Ok(Self { source, part, reader: source.read(part)?, line: String::new(), at: 0 })
     }
 
-    fn advance(&mut self) -> Result<bool, Diagnostic> {
+    pub(super) fn advance(&mut self) -> Result<bool, Diagnostic> {
         self.at = self.reader.consumed();
-        let shown = self.source.part_name(self.part);
-        self.reader.line(&mut self.line).map_err(|error| unreadable(shown, &error))
+        let Self { source, part, reader, line, at } = self;
+        reader.line(line).map_err(|error| source.unreadable_at(*part, *at, &error))
     }
 
-    fn notes(&self, faults: &Faults, naming: &mut Naming) -> Vec<Diagnostic> {
+    pub(super) fn notes(&self, faults: &Faults, naming: &mut Naming) -> Vec<Diagnostic> {
         let mut notes = std::mem::take(&mut naming.notes);
         if let Some(remark) = self.reader.encoding_remark() {
             notes.push(Diagnostic::note("T0014", remark));
@@ -57,157 +54,13 @@ impl<'a> Lines<'a> {
         notes
     }
 
-    fn nothing(&self) -> Diagnostic {
+    pub(super) fn nothing(&self) -> Diagnostic {
         Diagnostic::error("T0003", format!("{} has no samples", self.source.part_name(self.part)))
     }
 }
 
 fn origin(format: TraceFormat) -> Origin {
     Origin { format, description: format.title().to_owned(), start_utc: None }
-}
-
-/// A channel of a TwinCAT file.
-#[derive(Default)]
-struct Channel {
-    named: NamedHead,
-    times_s: Vec<f64>,
-    values: Vec<f64>,
-}
-
-/// Reads a TwinCAT Scope CSV.
-pub(super) fn read_twincat(
-    source: &Source,
-    part: usize,
-    options: &ImportOptions,
-    sink: &mut dyn Sink,
-) -> Result<About, Diagnostic> {
-    let mut lines = Lines::new(source, part)?;
-    let mut head: Vec<Vec<String>> = Vec::new();
-    let mut separator = '\t';
-    let first_row = loop {
-        if !lines.advance()? || head.len() > HEAD_LINES_MAX {
-            return Err(lines.nothing());
-        }
-        if head.is_empty() {
-            separator = ['\t', ';', ','].into_iter().find(|c| lines.line.contains(*c)).unwrap_or('\t');
-        }
-        let row = cells(&lines.line, separator);
-        let numbers = row.iter().all(|cell| number(cell, separator != ',').is_some());
-        if numbers && row.iter().any(|cell| !cell.is_empty()) {
-            break row;
-        }
-        head.push(row);
-    };
-    let mut naming = Naming::new(TraceFormat::TwinCatCsv, options);
-    let (mut channels, periods_s, metadata) = channels(&head, &mut naming);
-    let mut faults = Faults::default();
-    let mut row = first_row;
-    let (mut rows, mut samples) = (0_u64, 0_usize);
-    loop {
-        samples += take_row(&row, separator, rows, &mut channels, &periods_s, lines.at, &mut faults);
-        rows += 1;
-        if samples > SAMPLES_MAX {
-            let message = format!("{} has more than {SAMPLES_MAX} samples", source.part_name(part));
-            return Err(Diagnostic::error("T0017", message).help("export fewer channels, or a shorter time"));
-        }
-        if !lines.advance()? || lines.line.trim() == "EOF" {
-            break;
-        }
-        row = cells(&lines.line, separator);
-    }
-    merge(&mut channels, &periods_s, sink)?;
-    let notes = lines.notes(&faults, &mut naming);
-    let metadata = BTreeMap::from([("twincat".to_owned(), metadata)]);
-    Ok(About { origin: origin(TraceFormat::TwinCatCsv), metadata, notes })
-}
-
-type Head2 = (Vec<Channel>, Vec<Option<f64>>, BTreeMap<String, String>);
-
-/// Channels, their sampling periods, and what the head says of the file.
-fn channels(head: &[Vec<String>], naming: &mut Naming) -> Head2 {
-    let mut metadata = BTreeMap::new();
-    // The head of the channels begins at the last line whose key is `Name`.
-    let begin = head.iter().rposition(|row| row.first().is_some_and(|key| key == "Name")).unwrap_or(0);
-    for row in &head[..begin] {
-        if let [key, value, ..] = row.as_slice() {
-            metadata.insert(key.clone(), value.clone());
-        }
-    }
-    let value = |key: &str, channel: usize| {
-        let row = head[begin..].iter().find(|row| row.first().is_some_and(|own| own == key))?;
-        row.get(2 * channel + 1).filter(|text| !text.is_empty()).cloned()
-    };
-    let count = head.get(begin).map_or(0, |row| row.len().div_ceil(2));
-    let mut named = Vec::new();
-    let mut periods_s = Vec::new();
-    for channel in 0..count {
-        let Some(name) = value("SymbolName", channel).or_else(|| value("Name", channel)) else { break };
-        let mut entry = named_head(&name, None, false, naming);
-        entry.head.clock = Clock::Servo;
-        named.push(entry);
-        let period = value("SampleTime[ms]", channel).and_then(|text| number(&text, true));
-        periods_s.push(period.filter(|period| *period > 0.0).map(|period_ms| period_ms / MS_PER_S));
-    }
-    naming.settle(&mut named);
-    let channels = named.into_iter().map(|named| Channel { named, ..Channel::default() }).collect();
-    (channels, periods_s, metadata)
-}
-
-/// Samples of one row: pairs, one time for all, or none. Returns how many there were.
-fn take_row(
-    row: &[String],
-    separator: char,
-    index: u64,
-    channels: &mut [Channel],
-    periods_s: &[Option<f64>],
-    at: u64,
-    faults: &mut Faults,
-) -> usize {
-    let read =
-        |place: usize| row.get(place).filter(|text| !text.is_empty()).and_then(|text| number(text, separator != ','));
-    let count = channels.len();
-    let mut taken = 0;
-    for (channel, entry) in channels.iter_mut().enumerate() {
-        let (time_s, value) = if row.len() >= 2 * count {
-            (read(2 * channel).map(|time_ms| time_ms / MS_PER_S), read(2 * channel + 1))
-        } else if row.len() == count + 1 {
-            (read(0).map(|time_ms| time_ms / MS_PER_S), read(channel + 1))
-        } else {
-            (periods_s.get(channel).copied().flatten().map(|period_s| index as f64 * period_s), read(channel))
-        };
-        let (Some(time_s), Some(value)) = (time_s.filter(|time| time.abs() < TIME_MAX_S), value) else { continue };
-        if entry.times_s.last().is_some_and(|last| time_s <= *last) {
-            faults.count("T0009", "a sample is not later than the one before and is left out", at);
-            continue;
-        }
-        entry.times_s.push(time_s);
-        entry.values.push(value * entry.named.factor);
-        taken += 1;
-    }
-    taken
-}
-
-/// Channels on their own grids as rows in order of time.
-fn merge(channels: &mut [Channel], periods_s: &[Option<f64>], sink: &mut dyn Sink) -> Result<(), Diagnostic> {
-    let mut heads: Vec<Head> = Vec::new();
-    for (channel, period_s) in channels.iter().zip(periods_s) {
-        heads.push(Head { layout: Layout::Own, period_s: *period_s, ..channel.named.head.clone() });
-    }
-    sink.begin(&heads)?;
-    let mut next = vec![0_usize; channels.len()];
-    let mut row = Vec::new();
-    loop {
-        let due = channels.iter().zip(&next).filter_map(|(channel, at)| channel.times_s.get(*at).copied());
-        let Some(now_s) = due.min_by(f64::total_cmp) else { return Ok(()) };
-        row.clear();
-        for (place, channel) in channels.iter().enumerate() {
-            if channel.times_s.get(next[place]) == Some(&now_s) {
-                row.push((place, channel.values[next[place]]));
-                next[place] += 1;
-            }
-        }
-        sink.row(now_s, &row)?;
-    }
 }
 
 /// Reads what halscope saved.

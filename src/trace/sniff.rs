@@ -90,10 +90,14 @@ fn xml(start: &str, shown: &str) -> Result<TraceFormat, Diagnostic> {
 /// `Name<TAB>...`, and soon the keys of channels.
 fn twincat(start: &str) -> bool {
     let lines: Vec<&str> = start.lines().take(LINES_MAX).collect();
-    let key = |line: &str| line.split(['\t', ';', ',']).next().unwrap_or("").trim().to_owned();
-    let first = lines.first().map(|line| key(line)).unwrap_or_default();
+    // Any of several letters separates, quotation marks may stand around a key.
+    let begins = |line: &str, word: &str| {
+        let rest = line.trim_start_matches('"').strip_prefix(word).map(|rest| rest.trim_start_matches('"'));
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['\t', ';', ',', ':', ' ']))
+    };
     let known = ["SampleTime[ms]", "Starttime of export", "SymbolName", "NetID", "VariableSize", "SymbolComment"];
-    (first == "Name" || first == "File") && lines.iter().any(|line| known.iter().any(|word| key(line) == *word))
+    let first = lines.first().is_some_and(|line| begins(line, "Name") || begins(line, "File"));
+    first && lines.iter().any(|line| known.iter().any(|word| begins(line, word)))
 }
 
 /// Rows of numbers, separated by blanks, without a head.

@@ -1,4 +1,4 @@
-//! The file behind a trace: plain, zipped or a folder of chained files, and which format its content is.
+//! The file behind a trace: plain, packed (zip, gzip) or a folder of chained files, and which format its content is.
 //!
 //! In: a path. Out: [`Source`] with its parts in the order of their names, each readable from its beginning as often as wanted; the
 //! [`TraceFormat`]. The ending of a name decides nothing. Does not interpret the content any further.
@@ -46,8 +46,18 @@ pub(super) struct Source<'a> {
 struct Part {
     shown: Arc<str>,
     path: PathBuf,
-    /// Place in the archive; `None`: the file itself.
-    entry: Option<usize>,
+    packing: Packing,
+}
+
+/// How a part lies in its file.
+#[derive(Clone, Copy, Debug)]
+enum Packing {
+    /// It is the file.
+    Plain,
+    /// It is all that the file unpacks to.
+    Gzip,
+    /// Place in a zip archive.
+    Zip(usize),
 }
 
 /// A part that is being read.
@@ -68,15 +78,27 @@ impl<'a> Source<'a> {
                 File::open(&file).and_then(|mut file| file.read(&mut mark)).map_err(|error| unreadable(&error))?;
             if read == 4 && mark == *b"PK\x03\x04" {
                 parts.extend(archive(&file)?);
-            } else {
-                parts.push(Part { shown: Arc::from(file.display().to_string()), path: file, entry: None });
+                continue;
             }
+            let packing = if mark.starts_with(&[0x1f, 0x8b, 8]) { Packing::Gzip } else { Packing::Plain };
+            parts.push(Part { shown: Arc::from(file.display().to_string()), path: file, packing });
         }
         if parts.is_empty() || parts.len() > PARTS_MAX {
             let message = format!("{shown} holds {} files that could be a trace", parts.len());
             return Err(Diagnostic::error("T0002", message).help("name the file itself"));
         }
         Ok(Self { shown, parts, progress, total })
+    }
+
+    /// A recording is read by its index: not out of an archive.
+    pub(super) fn refuse_packed(&self) -> Result<(), Diagnostic> {
+        match self.parts.first() {
+            Some(part) if !matches!(part.packing, Packing::Plain) => {
+                let message = format!("{} is a recording in an archive", part.shown);
+                Err(Diagnostic::error("T0018", message).help("unpack it, and name the recording"))
+            }
+            _ => Ok(()),
+        }
     }
 
     pub(super) fn part_count(&self) -> usize {
@@ -94,12 +116,21 @@ impl<'a> Source<'a> {
     }
 
     fn bytes(&self, part: usize) -> Result<Box<dyn Read + 'a>, Diagnostic> {
-        let Part { shown, path, entry } = &self.parts[part];
+        let Part { shown, path, packing } = &self.parts[part];
         let file = File::open(path).map_err(|error| unreadable(shown, &error))?;
-        let Some(entry) = entry else {
-            let before: u64 =
-                self.parts[..part].iter().filter_map(|part| part.path.metadata().ok()).map(|m| m.len()).sum();
-            return Ok(Box::new(Counted { reader: file, done: before, total: self.total, progress: self.progress }));
+        let before: u64 = self.parts[..part].iter().filter_map(|part| part.path.metadata().ok()).map(|m| m.len()).sum();
+        let entry = match packing {
+            Packing::Zip(entry) => entry,
+            Packing::Plain => {
+                let done = before;
+                return Ok(Box::new(Counted { reader: file, done, total: self.total, progress: self.progress }));
+            }
+            Packing::Gzip => {
+                let limit = unpacked_max(file.metadata().map_or(0, |about| about.len()));
+                let packed = Counted { reader: file, done: before, total: self.total, progress: self.progress };
+                let packed = io::BufReader::new(packed);
+                return Ok(Box::new(Bounded { reader: flate2::bufread::MultiGzDecoder::new(packed), left: limit }));
+            }
         };
         let fault = |error: zip::result::ZipError| damaged_archive(shown, &error.to_string());
         let mut archive = zip::ZipArchive::new(file).map_err(fault)?;
@@ -116,8 +147,7 @@ impl<'a> Source<'a> {
             zip::CompressionMethod::Stored => Ok(Box::new(packed)),
             zip::CompressionMethod::Deflated => {
                 let unpacked = flate2::read::DeflateDecoder::new(packed);
-                let limit = UNPACKED_FREE_BYTES.saturating_add(packed_bytes.saturating_mul(UNPACKED_RATIO_MAX));
-                Ok(Box::new(Bounded { reader: unpacked, left: limit }))
+                Ok(Box::new(Bounded { reader: unpacked, left: unpacked_max(packed_bytes) }))
             }
             other => {
                 Err(damaged_archive(shown, &format!("it is packed with {other}, which this program does not read")))
@@ -131,7 +161,7 @@ impl<'a> Source<'a> {
         let silent = Source { shown: String::new(), parts: Vec::new(), progress: Progress(None), total: 0 };
         let part = &self.parts[0];
         let alone = Source {
-            parts: vec![Part { shown: part.shown.clone(), path: part.path.clone(), entry: part.entry }],
+            parts: vec![Part { shown: part.shown.clone(), path: part.path.clone(), packing: part.packing }],
             ..silent
         };
         let read = alone.bytes(0)?.take(SNIFF_BYTES).read_to_end(&mut head);
@@ -156,21 +186,33 @@ impl<'a> Source<'a> {
         super::sniff::format_of(&text, shown)
     }
 
+    /// A part cannot be read on; a line that is too long is shown.
+    pub(super) fn unreadable_at(&self, part: usize, byte: u64, error: &io::Error) -> Diagnostic {
+        let finding = unreadable(self.part_name(part), error);
+        let place = if error.to_string() == TOO_LONG { self.place(part, byte, "here") } else { None };
+        match place {
+            Some(place) => finding.at(place),
+            None => finding,
+        }
+    }
+
     /// The line that holds a byte of the decoded text, with the byte marked. Reads the part again: only for findings.
     pub(super) fn place(&self, part: usize, byte: u64, label: &str) -> Option<Place> {
         let silent = Progress(None);
         let quiet = Source { shown: String::new(), parts: Vec::new(), progress: silent, total: 0 };
         let here = &self.parts[part];
-        let copy = Part { shown: here.shown.clone(), path: here.path.clone(), entry: here.entry };
+        let copy = Part { shown: here.shown.clone(), path: here.path.clone(), packing: here.packing };
         let mut reader = Source { parts: vec![copy], ..quiet }.read(0).ok()?;
         let mut line = String::new();
         let mut number = 0_u32;
         loop {
             let start = reader.consumed();
-            if !reader.line(&mut line).ok()? {
-                return None;
-            }
             number = number.saturating_add(1);
+            match reader.line(&mut line) {
+                Ok(true) => {}
+                Ok(false) => return None,
+                Err(_) => return Some(marked(here.shown.clone(), number, &line, 0, label)),
+            }
             if byte < reader.consumed() {
                 return Some(marked(here.shown.clone(), number, &line, (byte - start) as usize, label));
             }
@@ -221,7 +263,7 @@ fn archive(path: &Path) -> Result<Vec<Part>, Diagnostic> {
     let part = |(place, name): (usize, String)| Part {
         shown: Arc::from(format!("{shown}:{name}")),
         path: path.to_owned(),
-        entry: Some(place),
+        packing: Packing::Zip(place),
     };
     Ok(names.into_iter().map(part).collect())
 }
@@ -270,6 +312,11 @@ impl<R: Read> Read for Counted<'_, R> {
         }
         Ok(count)
     }
+}
+
+/// So many bytes may come out of packed ones.
+fn unpacked_max(packed_bytes: u64) -> u64 {
+    UNPACKED_FREE_BYTES.saturating_add(packed_bytes.saturating_mul(UNPACKED_RATIO_MAX))
 }
 
 /// Ends a zip bomb.

@@ -12,6 +12,8 @@ const BUFFER_BYTES: usize = 128 * 1024;
 
 /// The error text that says that an item is too long.
 pub(super) const TOO_LONG: &str = "a tag, text or line that is too long";
+/// Bytes that are kept of a line that is too long.
+const SHOWN_OF_TOO_LONG: usize = 200;
 
 /// Windows-1252 where it differs from Latin-1: 0x80 to 0x9f; undefined places keep their number.
 const WINDOWS_1252: [char; 32] = [
@@ -96,7 +98,15 @@ impl<R: Read> TextReader<R> {
         line.clear();
         let mut bytes = std::mem::take(line).into_bytes();
         loop {
-            let available = self.fill_buf()?;
+            let available = match self.fill_buf() {
+                Ok(available) => available,
+                Err(error) => {
+                    // What begins a line that is too long shows where it is.
+                    bytes.truncate(SHOWN_OF_TOO_LONG);
+                    *line = String::from_utf8_lossy(&bytes).into_owned();
+                    return Err(error);
+                }
+            };
             if available.is_empty() {
                 break;
             }

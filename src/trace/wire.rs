@@ -3,6 +3,7 @@
 //! In: samples of an importer. Out: plain data with times in seconds from the start of the trace. A value that is not there is NaN:
 //! from its instant to the next sample the signal has no value. Does not read files.
 
+use super::programmed::ProgrammedPath;
 use crate::base::units::NS_PER_S;
 use crate::base::{AxisKind, Diagnostic};
 use crate::program::OpenedProgram;
@@ -24,6 +25,8 @@ pub struct Trace {
     pub events: Vec<TraceEvent>,
     /// NC programs that travelled with the trace: the first is the main program.
     pub programs: Vec<OpenedProgram>,
+    /// What the program asks of the path; empty unless it was asked for ([`ImportOptions::programmed`](super::ImportOptions)) and is known.
+    pub programmed: ProgrammedPath,
     /// Name and text of the machine file that travelled with the trace.
     pub machine: Option<(String, String)>,
     /// Other things that the file says about itself, record by record, key by key.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-fn sollwert(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
+pub fn sollwert(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     let output =
         Command::new(env!("CARGO_BIN_EXE_sollwert")).args(arguments).current_dir(folder).output().expect("it starts");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

@@ -190,6 +190,37 @@ fn another_feed_smears_the_view_in_time_and_not_the_one_along_the_path() {
 }
 
 #[test]
+fn the_minimum_zone_is_narrower_where_the_least_squares_centre_stays_behind() {
+    // A narrow bump on one side and a narrow dent on the other: a shift of h / 2 makes a ring of width h of them, and least squares hardly sees
+    // them: its first harmonic is 2 h w sqrt(pi) / pi for a width w of the bells.
+    let (h_mm, w_rad) = (0.02, 0.05);
+    let bell = |angle: f64, at: f64| (-((angle - at + PI).rem_euclid(TAU) - PI).powi(2) / (w_rad * w_rad)).exp();
+    let radius = |angle: f64| 30.0 + h_mm * (bell(angle, 0.8) - bell(angle, 0.8 + PI));
+    let a = moved(0.0005, 10_000, |t| on_circle(30.0, round(t)), |t, _| on_circle(radius(round(t)), round(t)));
+    let circle = examine(&a, None).expect("figures").own.expect("a contour").features.circles[0].clone();
+    let least_squares_um = 1000.0 * 2.0 * h_mm * (1.0 - 2.0 * w_rad * PI.sqrt() / PI);
+    assert!((circle.deviation_um - least_squares_um).abs() < 0.4, "{circle:?} {least_squares_um}");
+    // The bells are not points: beside their tops the shifted circle shows a little more.
+    assert!(
+        circle.minimum_zone_um > 0.99 * 1000.0 * h_mm && circle.minimum_zone_um < 1.05 * 1000.0 * h_mm,
+        "{circle:?}"
+    );
+}
+
+#[test]
+fn arcs_of_less_than_a_full_turn_are_counted_and_not_judged() {
+    // A straight way, half a circle of 10 mm, a straight way back.
+    let half = |t: f64| -> [f64; 2] {
+        let s_mm = 60.0 * smooth(t / 4.0);
+        let turned = (s_mm - 14.0).clamp(0.0, 10.0 * PI) / 10.0;
+        let [x, y] = [10.0 * turned.sin(), 10.0 - 10.0 * turned.cos()];
+        [x + s_mm.min(14.0) - (s_mm - 14.0 - 10.0 * PI).max(0.0), y]
+    };
+    let own = examine(&moved(0.001, 4000, half, |_, p| p), None).expect("figures").own.expect("a contour");
+    assert!(own.features.circles.is_empty() && own.features.arcs_total == 1, "{:?}", own.features);
+}
+
+#[test]
 fn a_corner_knows_its_overshoot_and_its_cut() {
     // Along X, then along Y; the actual path runs 12 um past the corner and swings back.
     let corner = |t: f64| if t < 1.0 { [30.0 * t, 0.0] } else { [30.0, 30.0 * (t - 1.0)] };

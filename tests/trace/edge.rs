@@ -82,6 +82,56 @@ fn rows_events_and_lines_are_in_the_trace() {
 }
 
 #[test]
+fn low_frequency_values_stand_at_their_counters_and_are_held() {
+    let head = header(CYCLE).replace(
+        "\"Initial\"",
+        "\"SignalListLFData\":[{\"id\":\"1\",\"device\":\"NCU\",\"path\":\"/Channel/Spindle/speedOvr\",\"samplingPeriod\":100},\
+         {\"id\":\"2\",\"path\":\"/Channel/State/actToolLength1\"}],\"Initial\"",
+    );
+    let low = |counter: u64, address: &str, value: &str, key: &str| {
+        format!("{{\"address\":\"{address}\",\"value\":{value},\"value_type\":\"DOUBLE\",\"{key}\":{counter}}}")
+    };
+    let element = |values: &[String]| format!("{{\"LFData\":[{}]}}", values.join(","));
+    let payload = [
+        // Both ways of writing the counter; ahead of its row, and after it.
+        element(&[low(120, "/Channel/Spindle/speedOvr", "100.0", "HFProbeCounter")]),
+        element(&[low(160, "/Channel/State/actToolLength1", "\"81.5\"", "HfProbeCounter")]),
+        rows(100..200),
+        element(&[
+            low(190, "/Channel/Spindle/speedOvr", "80", "HFProbeCounter"),
+            low(200, "/x", "1", "HFProbeCounter"),
+        ]),
+        rows(200..300),
+    ];
+    let text = format!("{head}\"Payload\":[{}],\n\"Footer\":{{}} }}\n", payload.join(","));
+    let trace = read("low.json", text.as_bytes(), &named()).unwrap();
+    assert_rows(&trace, 100, 100..300);
+    let at =
+        |name: &str, counter: u32| trace.signal(name).unwrap().value_at(f64::from(counter - 100) * 0.002, Method::Hold);
+    assert!(at("/Channel/Spindle/speedOvr", 119).is_nan());
+    assert_eq!((at("/Channel/Spindle/speedOvr", 120), at("/Channel/Spindle/speedOvr", 199)), (100.0, 100.0));
+    assert_eq!((at("/Channel/Spindle/speedOvr", 200), at("/Channel/State/actToolLength1", 160)), (80.0, 81.5));
+    let told = |words: &str| trace.notes.iter().any(|note| note.message.contains(words));
+    assert!(told("20 ms after their time") && told("belongs to no signal of the header"), "{:?}", trace.notes);
+}
+
+#[test]
+fn a_gzip_is_read_whatever_its_name() {
+    let packed = |bytes: &[u8]| {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    };
+    let text = file(CYCLE, &[rows(100..300)]);
+    let trace = read("edge.json.gz", &packed(text.as_bytes()), &named()).unwrap();
+    assert_eq!(trace.origin.format, TraceFormat::EdgeJson);
+    assert_rows(&trace, 100, 100..300);
+    let table: String = (0..50).map(|k| format!("{},{k}\n", f64::from(k) * 0.002)).collect();
+    let trace = read("table", &packed(format!("time_s,X_mm\n{table}").as_bytes()), &named()).unwrap();
+    assert_eq!(trace.signal("X.position_setpoint_mm").unwrap().values[49], 49.0);
+}
+
+#[test]
 fn the_counter_wraps_and_what_is_missing_is_a_gap() {
     let first = (1 << 31) - 50;
     let counters = || (first..first + 100).chain(first + 140..first + 200);

@@ -45,3 +45,36 @@ fn every_bit_of_an_array_is_read() {
     let odd = file("ResponseTestCustom", &[("a", "double", vec![1.5])]).replace("</raw>", "%</raw>");
     assert_eq!(read("odd_digits.xml", odd.as_bytes(), &ImportOptions::default()).unwrap_err().code, "T0004");
 }
+
+/// As step responses and frequency measurements are written: the time in the object of the series, pairs beside their frequencies.
+#[test]
+fn a_series_has_the_time_of_its_object_and_a_response_is_pairs() {
+    let raw = |name: &str, values: &[f64]| {
+        let text = array(values);
+        format!(
+            "<NumericArray name=\"{name}\" elementtype=\"9\" format=\"base85\"><raw name=\"m_pNumberArray\">{text}</raw></NumericArray>"
+        )
+    };
+    let series = |name: &str, end: f64, values: &[f64]| {
+        let values = raw("m_ValueVector", values);
+        format!("<TimeSeries name=\"{name}\">{values}<float name=\"m_TimeVector.end\">{end}</float></TimeSeries>")
+    };
+    let text = format!(
+        "<ResponseTestCustom>{}{}<FrequencyResponseFunction name=\"m_pPlant\">{}{}</FrequencyResponseFunction></ResponseTestCustom>",
+        series("m_Fast", 0.004, &[1.0, 2.0, 3.0, 4.0, 5.0]),
+        series("m_Slow", 0.004, &[10.0, 20.0, 30.0]),
+        raw("m_FrequencyVector", &[1.0, 10.0]),
+        raw("m_ValueVector", &[0.5, -0.25, 0.125, -8.0]),
+    );
+    let trace = read("series.xml", text.as_bytes(), &ImportOptions::default()).unwrap();
+    let fast = trace.signal("m_Fast.m_ValueVector").unwrap();
+    assert_eq!((fast.times.period_s(), fast.values.as_slice()), (Some(0.001), &[1.0, 2.0, 3.0, 4.0, 5.0][..]));
+    let slow = trace.signal("m_Slow.m_ValueVector").unwrap();
+    assert_eq!(
+        (slow.times.period_s(), slow.times.end_s(), slow.values.as_slice()),
+        (Some(0.002), Some(0.004), &[10.0, 20.0, 30.0][..])
+    );
+    assert_eq!(trace.signal("m_pPlant.m_ValueVector.re").unwrap().values, [0.5, 0.125]);
+    assert_eq!(trace.signal("m_pPlant.m_ValueVector.im").unwrap().values, [-0.25, -8.0]);
+    assert!(!trace.notes.iter().any(|note| note.message.contains("is assumed")), "{:?}", trace.notes);
+}

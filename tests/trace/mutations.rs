@@ -1,9 +1,11 @@
-//! Bytes changed, cut and doubled at random: every importer ends, without a panic, with a trace or a finding.
+//! Bytes changed, cut and doubled at random: every importer ends, without a panic, with a trace or a finding; comparison and report too.
 
 use super::operate::{linear, read};
 use super::operate_session::Session;
 use super::random::Random;
-use sollwert::trace::ImportOptions;
+use sollwert::compare::{CompareOptions, compare, document, examine, prepare};
+use sollwert::report::Sheet;
+use sollwert::trace::{ImportOptions, Trace};
 
 /// Small files of every format.
 fn samples() -> Vec<(&'static str, Vec<u8>)> {
@@ -60,10 +62,31 @@ fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
+/// Of so many mutants one is compared and drawn.
+const COMPARED_EVERY: u32 = 8;
+
+/// What reads traces ends well on whatever an importer lets through.
+fn judge(trace: &mut Trace, original: &Trace) {
+    prepare(trace);
+    let side = examine(trace, None).expect("XY is a plane");
+    let options = CompareOptions { budget: true, drift: true, ..CompareOptions::default() };
+    for (a, b) in [(&*trace, original), (original, &*trace)] {
+        if let Ok(comparison) = compare(a, b, &options) {
+            assert!(document(&comparison).is_object());
+            let sheet = Sheet { trace: a, side: &comparison.sides[0], reference: Some((b, &comparison)) };
+            sollwert::report::write(&sheet, &super::recorded::temporary("mutant.html")).expect("a page");
+        }
+    }
+    let sheet = Sheet { trace, side: &side, reference: None };
+    sollwert::report::write(&sheet, &super::recorded::temporary("mutant.html")).expect("a page");
+}
+
 #[test]
 fn no_importer_falls_over_damaged_bytes() {
     for (format, bytes) in samples() {
-        assert!(read(&format!("mutant_{format}"), &bytes, &ImportOptions::default()).is_ok(), "{format}");
+        let original = read(&format!("mutant_{format}"), &bytes, &ImportOptions::default());
+        let mut original = original.unwrap_or_else(|finding| panic!("{format}: {finding:?}"));
+        prepare(&mut original);
         let mut random = Random::new(7);
         for turn in 0..rounds() {
             let mutant = mutated(&bytes, &mut random);
@@ -71,7 +94,12 @@ fn no_importer_falls_over_damaged_bytes() {
             let read =
                 std::panic::catch_unwind(|| read(&format!("mutant_{format}"), &mutant, &ImportOptions::default()));
             let Ok(read) = read else { panic!("{format}, turn {turn}: {:?}", String::from_utf8_lossy(&mutant)) };
-            if let Ok(trace) = read {
+            if let Ok(mut trace) = read {
+                if turn.is_multiple_of(COMPARED_EVERY) {
+                    let judged =
+                        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| judge(&mut trace, &original)));
+                    assert!(judged.is_ok(), "{format}, turn {turn}: {:?}", String::from_utf8_lossy(&mutant));
+                }
                 for signal in &trace.signals {
                     assert_eq!(signal.times.len(), signal.values.len(), "{format}, turn {turn}: {}", signal.original);
                     let increasing = signal.times.iter().zip(signal.times.iter().skip(1)).all(|(one, next)| one < next);

@@ -31,6 +31,48 @@ fn a_scope_file_has_channels_on_their_own_grids() {
     }
 }
 
+/// The scope's own way: channels of one task share a column of time, the key stands again where the next group begins.
+#[test]
+fn groups_of_channels_share_a_column_of_time() {
+    for (separator, quote) in [('\t', ""), (';', ""), (':', ""), (' ', "\"")] {
+        let line = |cells: &[&str]| {
+            let shown =
+                |cell: &&str| if cell.contains(' ') { format!("{quote}{cell}{quote}") } else { (*cell).to_owned() };
+            cells.iter().map(shown).collect::<Vec<_>>().join(&separator.to_string()) + "\r\n"
+        };
+        let mut text =
+            line(&["Name", "Project"]) + &line(&["Starttime of export", "132959733843760000", "Monday"]) + "\r\n\r\n";
+        text += &line(&["Name", "ActPos", "SetVelo", "Name", "load", ""]);
+        text += &line(&["Data-Type", "REAL64", "REAL64", "Data-Type", "REAL32"]);
+        text += &line(&["SampleTime[ms]", "2", "2", "SampleTime[ms]", "0.5"]);
+        text += &line(&["SymbolName", "Axes.X.ActPos", "Axes.X.SetVelo", "SymbolName", ""]);
+        text += &line(&["Unit", "(None)", "(None)", "Unit", "% (Ratio)"]);
+        text += "\r\n";
+        for k in 0..40 {
+            // The slow group ends after a quarter of its lines; the clock of the other starts before.
+            let fast = [format!("{}", f64::from(k) * 0.5 - 3.0), format!("{k}")];
+            let slow = match k {
+                0..10 => [format!("{}", 2 * k), format!("{}", f64::from(k) * 0.25), format!("{}", 10 * k)],
+                _ => [String::new(), String::new(), String::new()],
+            };
+            let cells: Vec<&str> = slow.iter().chain(&fast).map(String::as_str).collect();
+            text += &line(&cells);
+        }
+        text += "EOF\r\n";
+        let trace = read("groups.csv", text.as_bytes(), &ImportOptions::default()).unwrap();
+        assert_eq!(trace.origin.format, TraceFormat::TwinCatCsv, "{separator:?}");
+        assert_eq!(trace.origin.start_utc.as_deref(), Some("2022-05-02T13:56:24.376Z"));
+        assert_eq!(trace.signals.len(), 3, "{separator:?}");
+        let position = trace.signal("X.position_measured_mm").unwrap();
+        assert_eq!((position.len(), position.times.start_s(), position.times.period_s()), (10, Some(0.0), Some(0.002)));
+        let velocity = trace.signal("X.velocity_setpoint_mm_s").unwrap();
+        assert_eq!((velocity.values[9], velocity.times.end_s()), (90.0, Some(0.018)));
+        let load = trace.signal("load").unwrap();
+        assert_eq!((load.len(), load.unit.as_str(), load.values[39]), (40, "%", 39.0));
+        assert_eq!((load.times.start_s(), load.times.period_s()), (Some(-0.003), Some(0.0005)));
+    }
+}
+
 #[test]
 fn halscope_says_its_period() {
     let mut text = String::from("# Sampling period is 1000000 ns\njoint.0.motor-pos-cmd;joint.0.f-error;spindle\n");

@@ -32,7 +32,7 @@ mod window;
 use super::corner::Rules;
 use super::smoother::Held;
 use crate::geometry::Curve;
-use crate::interpreter::{Compressor, Feed};
+use crate::interpreter::{Compressor, Event, Feed};
 use crate::machine::PathMode;
 use chords::Chords;
 use nodes::Nodes;
@@ -148,7 +148,7 @@ impl Run {
         let before = &last.curve;
         let rapids = [&last.head.feed, &block.head.feed].map(|feed| *feed == Feed::Rapid);
         let same = block.head.modes == last.head.modes && rapids[0] == rapids[1];
-        if !block.head.events.is_empty() || !same || before.end() != block.curve.start() {
+        if !block.head.events.iter().all(Event::only_tells) || !same || before.end() != block.curve.start() {
             return false;
         }
         let ends = [before.at(f64::INFINITY), block.curve.at(0.0)];
