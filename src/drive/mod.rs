@@ -10,8 +10,8 @@
 //!
 //! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal`,
 //! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `plain` is
-//! the short way of an axis without all that, `batch` steps many drives at once, `block` by `block`; `spindle` is how the master spindle lags. `docs/drive.md` has picture, law and
-//! code side by side.
+//! the short way of an axis without all that, `batch` steps many drives at once, `block` by `block`; `spindle` is how the master spindle
+//! lags. `docs/drive.md` has picture, law and code side by side.
 
 mod axis_drive;
 mod backlash;

@@ -485,30 +485,6 @@ pub enum Event {
     Programmed(Arc<ProgrammedBlock>),
 }
 
-/// Where the master spindle is sent.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SpindlePositioning {
-    /// Angle, or with `SpindleApproach::By` the way.
-    pub angle_rad: f64,
-    /// Which way round.
-    pub approach: SpindleApproach,
-    /// As programmed, such as "SPOS=90"; empty for M19, which is an event of its own.
-    pub text: Arc<str>,
-}
-
-/// Which way round the spindle goes to its position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpindleApproach {
-    /// As it turns; from rest the shorter way (plain, AC, DC).
-    Onward,
-    /// ACP.
-    Positive,
-    /// ACN.
-    Negative,
-    /// IC: by this way, from where it stands or comes to rest.
-    By,
-}
-
 impl Event {
     /// It only tells what the program says: nothing depends on it.
     pub fn only_tells(&self) -> bool {
@@ -552,4 +528,28 @@ impl ProgrammedMotion {
             Self::Positioning => "positioning",
         }
     }
+}
+
+/// Where the master spindle is sent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpindlePositioning {
+    /// Angle, or with `SpindleApproach::By` the way.
+    pub angle_rad: f64,
+    /// Which way round.
+    pub approach: SpindleApproach,
+    /// As programmed, such as "SPOS=90"; empty for M19, which is an event of its own.
+    pub text: Arc<str>,
+}
+
+/// Which way round the spindle goes to its position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpindleApproach {
+    /// As it turns; from rest the shorter way (plain, AC, DC).
+    Onward,
+    /// ACP.
+    Positive,
+    /// ACN.
+    Negative,
+    /// IC: by this way, from where it stands or comes to rest.
+    By,
 }

@@ -29,5 +29,5 @@ pub use in_position::InPosition;
 pub use preparation::{Findings, PieceSource, Preparation};
 pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
 pub use setpoint_table::{SetpointTable, row_period_s};
-pub use summary::{CornerSummary, OverrideSummary, RunSummary, Warning};
+pub use summary::{CornerSummary, OverrideSummary, RunSummary, Warning, drive_warnings};
 pub use what_if::{Saving, WhatIf, what_if};

@@ -142,7 +142,6 @@ impl Recorder {
         match event {
             Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
             Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {}
-            // M19 is an event of its own.
             Event::SpindlePosition(positioning) if positioning.text.is_empty() => {}
             _ => self.event(tick, Some(block), event.into()),
         }

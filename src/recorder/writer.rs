@@ -237,8 +237,8 @@ struct Topics {
     axes: PerAxis<Option<Channel>>,
     path: Channel,
     event: Channel,
-    programmed: Option<Channel>,
     spindle: Option<Channel>,
+    programmed: Option<Channel>,
     poses: [Option<Channel>; TOOL_TOPICS.len()],
 }
 
@@ -264,14 +264,14 @@ fn topics(setup: &RecordingSetup) -> (Topics, Declarations) {
     let nothing = BTreeMap::new();
     let path = add(PATH_TOPIC, PATH, &nothing);
     let event = add(EVENT_TOPIC, EVENT, &nothing);
+    let spindle =
+        (setup.machine.spindle.is_some() && !setup.programs.is_empty()).then(|| add(SPINDLE_TOPIC, SPINDLE, &nothing));
     let mut poses = [None; TOOL_TOPICS.len()];
     for (index, topic) in TOOL_TOPICS.into_iter().enumerate().filter(|(index, _)| signals.pose(*index)) {
         poses[index] = Some(add(topic, POSE_IN_FRAME, &nothing));
     }
     let programmed = setup.programmed.then(|| add(PROGRAMMED_TOPIC, PROGRAMMED, &nothing));
-    let turns = setup.machine.spindle.is_some() && !setup.programs.is_empty();
-    let spindle = turns.then(|| add(SPINDLE_TOPIC, SPINDLE, &nothing));
-    (Topics { axes, path, event, programmed, spindle, poses }, declarations)
+    (Topics { axes, path, event, spindle, programmed, poses }, declarations)
 }
 
 /// Numbers of schemas and channels count from 1; a schema is declared once.

@@ -153,8 +153,8 @@ fn a_fir_low_pass_delays_everything_alike() {
         let delayed = |k: usize| sine(k as f64 * period_s - delay_s);
         let at = (500..900).max_by(|a, b| delayed(*a).abs().total_cmp(&delayed(*b).abs())).unwrap();
         let ratio = signals[at].position_reference_lu / delayed(at);
-        for (k, s) in signals.iter().enumerate().take(900).skip(500) {
-            let apart = s.position_reference_lu - ratio * delayed(k);
+        for (k, signal) in signals.iter().enumerate().take(900).skip(500) {
+            let apart = signal.position_reference_lu - ratio * delayed(k);
             assert!(apart.abs() < 1e-9, "{frequency_hz} Hz, {k}: {apart:e}");
         }
     }
