@@ -189,7 +189,7 @@ fn tapping_turns_the_spindle_with_the_axis_and_back() {
             assert!((rows[rows.len() - 1].angle - TAU / 12.0).abs() < 1e-9, "{:?}", rows.last());
             let lowest = cut.iter().map(|row| row.z[0]).fold(f64::INFINITY, f64::min);
             // It turns back between two set-points, at 12.5 mm/s².
-            assert!(lowest >= -15.0 - 1e-9 && lowest < -15.0 + 1e-5, "{lowest}");
+            assert!((-15.0 - 1e-9..-15.0 + 1e-5).contains(&lowest), "{lowest}");
         }
     }
 }
