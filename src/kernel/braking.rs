@@ -20,9 +20,8 @@ const REST_SHARE: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub struct Braking {
     setpoints: PerAxis<AxisSetpoint>,
-    /// First position tick that is still to be stepped, of axes from this one on.
+    /// First position tick that is still to be stepped.
     next: Tick,
-    from: usize,
     end: Tick,
 }
 
@@ -52,9 +51,8 @@ impl<S: PieceSource> Kernel<S> {
         }
         let row_ticks = self.row_ticks();
         let cycles = (RAMPS_MAX * longest_s / machine.cycle.time_base.seconds(row_ticks)).ceil() as u64;
-        // The alarm came between two axes: those behind it are still at its tick.
-        let (next, from) = (last.tick, last.axis.index() + 1);
-        Some(Braking { setpoints, next, from, end: Tick(next.0 + cycles.saturating_mul(row_ticks)) })
+        let next = Tick(last.tick.0 + row_ticks);
+        Some(Braking { setpoints, next, end: Tick(next.0 + cycles.saturating_mul(row_ticks)) })
     }
 
     /// Steps all axes up to the next set-point tick; false: all stand, or the time is up. The output holds the rows.
@@ -64,10 +62,9 @@ impl<S: PieceSource> Kernel<S> {
         let until = (braking.next.0 / period + 1) * period;
         let mut rows: Vec<AxisRow> = std::mem::take(&mut self.output_mut().rows);
         rows.clear();
-        // What is left of the tick of the alarm says nothing about the others.
-        let mut stands = braking.from == 0;
+        let mut stands = true;
         while braking.next.0 < until {
-            for axis in machine.axis_ids().skip(std::mem::take(&mut braking.from)) {
+            for axis in machine.axis_ids() {
                 if !braking.next.0.is_multiple_of(self.position_ticks(axis)) {
                     continue;
                 }

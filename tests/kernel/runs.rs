@@ -252,7 +252,7 @@ fn a_clamped_axis_that_moves_is_an_alarm() {
     let measured = column(&path, "position_measured");
     let last = measured[measured.len() - 1];
     assert!((last - 30.0).abs() > 0.05 && (measured[measured.len() - 2] - 30.0).abs() <= 0.0501, "{last}");
-    let free = record("G1 X30 F3000\nM10\nG1 Y20\nM11\nX31\nM30\n", &loaded, 2, &scratch("released.mcap"));
+    let free = record("G1 X30 F3000\nM10\nG1 G9 Y20\nM11\nX31\nM30\n", &loaded, 2, &scratch("released.mcap"));
     assert!(free.alarm.is_none(), "{:?}", free.alarm);
 }
 

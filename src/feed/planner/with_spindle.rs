@@ -18,6 +18,9 @@ use crate::smoothing::{ContourPiece, PieceKind};
 /// A spindle whose speed is off by more under a constant cutting speed is told of.
 const OFF_SHARE_MAX: f64 = 0.1;
 
+/// Speeds above their limits by less are rounding, as for the thread.
+const ROUNDING_RATIO: f64 = 1e-9;
+
 impl Planner {
     /// Before a feed that follows a change of the spindle speed, or begins with one, the path rests. What happens when the piece begins happens
     /// when the wait does.
@@ -85,8 +88,7 @@ impl Planner {
             _ => "acceleration",
         };
         let [speed_rpm, most_rpm] = [1.0, found.speed_share].map(|share| rpm_from_rad_s(share * speed_rad_s));
-        // Rounded down, so that it is possible as it is shown.
-        let most_rpm = (most_rpm * 10.0).floor() / 10.0;
+        let most_rpm = rounded_down(most_rpm);
         let message = format!(
             "the thread of line {line} at S{speed_rpm:.1} is too fast for axis {axis}: its {what} allows S{most_rpm:.1} at most (alarm 22270)"
         );
@@ -141,7 +143,7 @@ impl Planner {
                 piece.length_lu(),
                 rpm_from_rad_s(piece.thread.speed_rad_s)
             );
-            let help = format!("begin earlier, end later, or give S{:.1} or less", (most_rpm * 10.0).floor() / 10.0);
+            let help = format!("begin earlier, end later, or give S{:.1} or less", rounded_down(most_rpm));
             self.findings.push((block, Diagnostic::warning("P0007", message).help(help)));
         }
         if !piece.thread.is_cut() {
@@ -156,6 +158,11 @@ impl Planner {
 /// The planner calls with threads only.
 fn no_thread(path: &JointPath) -> Diagnostic {
     Diagnostic::error("P0001", format!("the thread of line {} has no lead", path.contour.block.line))
+}
+
+/// To a tenth, so that the speed is possible as it is shown; what is a tenth but for rounding stays.
+fn rounded_down(speed_rpm: f64) -> f64 {
+    (speed_rpm * 10.0 * (1.0 + ROUNDING_RATIO)).floor() / 10.0
 }
 
 /// Events that make another spindle motion.
