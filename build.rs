@@ -9,10 +9,11 @@ use std::{env, fs};
 const PROTO_FOLDER: &str = "src/recorder/proto";
 
 /// One file for each schema of a recording, and the name of its descriptor set in `OUT_DIR`.
-const SCHEMA_FILES: [(&str, &str); 6] = [
+const SCHEMA_FILES: [(&str, &str); 7] = [
     ("sollwert/axis.proto", "axis.fds"),
     ("sollwert/path.proto", "path.fds"),
     ("sollwert/event.proto", "event.fds"),
+    ("sollwert/spindle.proto", "spindle.fds"),
     ("sollwert/sample.proto", "sample.fds"),
     ("sollwert/programmed.proto", "programmed.fds"),
     ("foxglove/PoseInFrame.proto", "pose_in_frame.fds"),

@@ -91,14 +91,15 @@ fn machine(criterion: &mut Criterion) {
             bencher.iter_batched(
                 || start.clone(),
                 |mut batch| {
-                    for k in 0..CYCLES as usize {
+                    let cycles = 0..CYCLES as usize;
+                    cycles.for_each(|k| {
                         batch.step_some(
                             |place| Some(inputs[place][k]),
                             |_, signals| {
                                 black_box(signals);
                             },
                         );
-                    }
+                    });
                     batch
                 },
                 criterion::BatchSize::SmallInput,

@@ -45,6 +45,9 @@
 //! 7. [`drive`] follows it: position, speed and current loops, motor and mechanics of every axis, down to the current cycle.
 //! 8. [`recorder`] writes all of it to MCAP on a thread of its own; [`kernel`] owns the loop.
 //!
+//! The rooms below the kernel read what it recorded, and what controls recorded: [`trace`], [`compare`], [`identify`] (parameters of a
+//! drive from traces of it), [`report`].
+//!
 //! Beside the cycle, [`optimum`] takes the pieces that feed has planned and finds the least time for the same path under the same
 //! limits (`sollwert time --optimal`).
 //!
@@ -102,5 +105,7 @@ pub mod recorder;
 pub mod kernel;
 pub mod trace;
 pub mod compare;
+pub mod identify;
+pub mod tune;
 pub mod report;
 pub mod cli;

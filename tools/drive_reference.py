@@ -58,6 +58,11 @@ class Drive:
     at_motor: bool = False  # MD31040 = 0
     screw: tuple = ()  # start, step, errors
     comp: tuple = ()
+    pulse: float = 0.0  # MD32520
+    fade: float = 1.0  # MD32540
+    adapt: tuple = ()  # MD32530, MD32550, MD32560, MD32570
+    play: float = 0.0
+    half: float = 0.0  # of MD32450, with the direction of the set velocity
 
 
 MVC_X = Drive(Tp=1e-3, np=8, nv=2, r=12 / math.tau, R=.75, L=6.5e-3, Ke=.43, Kt=1.30, J=.0085, B=.010, Tc=.6, Ts=.6,
@@ -182,6 +187,20 @@ class Delay:
         return (1 - self.f) * self.s[max(0, k - self.n)] + self.f * self.s[max(0, k - self.n - 1)]
 
 
+def amplitude(p, a):
+    """MD32510: the pulse over the acceleration at the reversal, piece by piece."""
+    if not p.adapt:
+        return p.pulse
+    low, a1, a2, a3 = p.adapt
+    if a < a1:
+        return p.pulse * a / a1
+    if a <= a2:
+        return p.pulse
+    if a < a3:
+        return max(low, p.pulse * (a3 - a) / (a3 - a2))
+    return low
+
+
 def simulate(p, x_set, load, held=True):
     """Rows (x, x_meas, e_fol, w, i, i_avg, u, t_ref, t_fric, flags), one a position cycle."""
     Tv, Ti = p.Tp / p.np, p.Tp / p.np / p.nv
@@ -197,6 +216,7 @@ def simulate(p, x_set, load, held=True):
     Ii, i_avg, q_th = p.R * i, i, quantise(th, p.qmot)
     D_x, D_v, D_a = Delay(p.dpos, p.Tp), Delay(p.dff, p.Tp), Delay(p.dff, p.Tp)
     x_old, v_old, rows = x_set[0], 0.0, []
+    direction, fading, nut = 0, 0.0, p.r * th
     if p.Jl:
         phi = hold / p.c
         y = [i, 0.0, phi, 0.0, th - phi if p.at_motor else th]
@@ -206,17 +226,26 @@ def simulate(p, x_set, load, held=True):
         return y[4] if p.Jl else th
 
     def position():
+        if p.play:
+            return nut
         nominal = p.r * load_angle()
         return nominal + error(p.screw, nominal)
     for k, xs in enumerate(x_set):
         v = (xs - x_old) / p.Tp
         a = (v - v_old) / p.Tp
+        fading *= math.exp(-p.Tp / p.fade)
+        if abs(v) > 1e-9:
+            now = int(math.copysign(1, v))
+            if now == -direction:
+                fading = now * amplitude(p, abs(a))
+            direction = now
         x_old, v_old = xs, v
         x_ref, v_ff, t_ff = D_x(xs), p.kvff * D_v(v), p.ktff * p.Jff * D_a(a) / p.r
         x_meas = quantise(p.r * th if p.at_motor else position(), p.qpos)
+        x_meas -= p.half * direction
         x_meas += error(p.comp, x_meas)
         e_fol = x_ref - x_meas
-        v_un = p.Kv * e_fol + v_ff
+        v_un = p.Kv * e_fol + v_ff + fading
         w_ref = clamp(v_un, p.vmax) / p.r
         samples = []
         for n in range(p.np * p.nv):
@@ -253,6 +282,8 @@ def simulate(p, x_set, load, held=True):
                 i, w, th = y[0], y[1], y[4] + y[2]
             else:
                 i, w, th = plant(p, i, w, th, u, Tg, Ti)
+            # The load is carried by whichever flank it touches at the end of a tick.
+            nut = max(p.r * th - p.play / 2, min(p.r * th + p.play / 2, nut))
         i_avg = sum(samples) / len(samples)
     return rows
 
@@ -283,6 +314,11 @@ def cases():
                             screw=(-4.0, 1.5, (2e-3, 5e-3, -3e-3, 1e-3, 4e-3, 0.0)),
                             comp=(-4.0, 3.0, (2e-3, -2e-3, 3e-3))),
            [-5.0 + 6.0 * (1 - math.cos(math.tau * 2 * k * 1e-3)) for k in range(401)], none, True, 8)
+
+    # Measured at the motor, play with its compensation, a friction pulse whose amplitude follows the acceleration: the reversals of a growing sine
+    # are below the first, between the first and second, between the second and third and above the third one.
+    yield ("reversal_pulse", replace(MVC_Y, kvff=1, at_motor=True, play=.02, half=.0075, pulse=6, fade=.012, adapt=(1.5, 200, 600, 1200)),
+           [2e-6 * k * k * math.sin(math.tau * 6 * k * 1e-3) for k in range(801)], none, True, 8)
 
 
 def main():

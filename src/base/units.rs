@@ -81,6 +81,16 @@ pub fn mm_from_m(value_m: f64) -> f64 {
     value_m * MM_PER_M
 }
 
+/// rad/s -> rev/min.
+pub fn rpm_from_rad_s(speed_rad_s: f64) -> f64 {
+    speed_rad_s / RAD_PER_REV * S_PER_MIN
+}
+
+/// rad -> revolutions, with any power of 1/s.
+pub fn rot_from_rad(value_rad: f64) -> f64 {
+    value_rad / RAD_PER_REV
+}
+
 /// rev/min -> rad/s.
 pub fn rad_s_from_rpm(speed_rpm: f64) -> f64 {
     speed_rpm * RAD_PER_REV / S_PER_MIN

@@ -4,14 +4,14 @@
 
 use super::failure::Failure;
 use super::output::{ProgressLine, show};
-use crate::base::Diagnostic;
 use crate::base::diagnostics::nearest;
 use crate::base::units::percent_from_ratio;
+use crate::base::{Diagnostic, SourceText};
 use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
-use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, unsupported};
+use crate::machine::{DEFAULT_MACHINE, LoadError, Loaded, Machine, load, load_workshop, parse, unsupported};
 use crate::program::{ProgramSource, taken_axis_names};
-use crate::recorder::{AXIS_FIELDS, axis_field};
+use crate::recorder::{AXIS_FIELDS, Recording, axis_field};
 use crate::trace::{ImportOptions, Progress};
 use clap::Args;
 use std::cell::RefCell;
@@ -43,6 +43,20 @@ impl MachineChoice {
         let loaded = load(name, &self.sets).map_err(refused)?;
         let taken = taken_axis_names(&loaded.machine);
         if taken.is_empty() { Ok(loaded) } else { Err(Failure::found_wrong(taken)) }
+    }
+
+    /// As `load`, but without `-m` a machine that travelled with a recording comes before the default one.
+    pub(super) fn load_or_recorded(&self, traces: &[PathBuf]) -> Result<Loaded, Failure> {
+        let recorded = || traces.iter().find_map(|path| Recording::open(path).ok()?.machine_text().ok()?);
+        match (&self.machine, recorded()) {
+            (None, Some((name, text))) => {
+                let note = format!("no machine given: that of the recording, `{name}`, is used");
+                show([&Diagnostic::note("M0000", note).help("name another one with -m")]);
+                let loaded = parse(&SourceText::new(name, text), &self.sets);
+                loaded.map_err(|findings| refused(LoadError::Invalid(findings)))
+            }
+            _ => self.load(),
+        }
     }
 
     /// The machine file, if it is one that can be overwritten.
@@ -264,6 +278,8 @@ pub(super) const SHIPPED_PROGRAMS: &[(&str, &str)] = &[
     ("corners.mpf", include_str!("../../programs/corners.mpf")),
     ("pocket.mpf", include_str!("../../programs/pocket.mpf")),
     ("spline.mpf", include_str!("../../programs/spline.mpf")),
+    ("tapping.mpf", include_str!("../../programs/tapping.mpf")),
+    ("thread.mpf", include_str!("../../programs/thread.mpf")),
 ];
 
 /// Opens a program, or a shipped one by its name where no file of that name exists.

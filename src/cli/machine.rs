@@ -5,6 +5,7 @@
 use super::bode::{BodeArguments, bode};
 use super::failure::Failure;
 use super::inputs::{MachineChoice, refused};
+use super::machine_data::{ExportArguments, ImportArguments, export, import};
 use super::output::{print, print_json, show, table};
 use crate::base::{AxisKind, Diagnostic, units};
 use crate::machine::{Axis, LoadError, Loaded, load, schema, shipped};
@@ -47,6 +48,10 @@ enum Action {
     },
     /// Frequency responses of the loops of an axis: margins, bandwidths, curves
     Bode(BodeArguments),
+    /// A machine file from SINUMERIK machine data: listings, drive parameters, archives
+    Import(ImportArguments),
+    /// SINUMERIK machine data of a machine, as a listing
+    Export(ExportArguments),
     /// The text of a machine file with --set applied: a shipped one is a good start for your own
     #[command(after_help = "Example:\n  sollwert machine show -m spinner_mvc850 > my_machine.toml")]
     Show {
@@ -63,6 +68,8 @@ impl MachineArguments {
     pub(super) fn json(&self) -> bool {
         match &self.action {
             Action::Bode(arguments) => arguments.json,
+            Action::Import(arguments) => arguments.json,
+            Action::Export(arguments) => arguments.json,
             Action::Check { json, .. }
             | Action::Schema { json }
             | Action::List { json }
@@ -77,6 +84,8 @@ pub(super) fn machine(arguments: &MachineArguments) -> Result<(), Failure> {
         Action::Schema { .. } => print_json(&schema()),
         Action::List { json } => list(*json),
         Action::Bode(arguments) => bode(arguments),
+        Action::Import(arguments) => import(arguments),
+        Action::Export(arguments) => export(arguments),
         Action::Show { machine, json } => {
             let loaded = machine.load()?;
             if *json {

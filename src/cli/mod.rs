@@ -13,8 +13,13 @@ mod explain;
 mod export;
 mod failure;
 mod follow;
+mod identify;
+mod identify_control;
+mod identify_page;
+mod identify_tables;
 mod inputs;
 mod machine;
+mod machine_data;
 mod moves;
 mod output;
 mod recorded;
@@ -22,6 +27,9 @@ mod recover;
 mod report;
 mod run;
 mod time;
+mod tune;
+mod tune_page;
+mod tune_tables;
 mod what_if;
 
 use clap::{Parser, Subcommand};
@@ -63,13 +71,17 @@ enum Command {
     Follow(follow::FollowArguments),
     /// Two traces, aligned: figures per signal, contour error, circles, corners; limits decide the exit code
     Compare(compare::CompareArguments),
+    /// Traces of a machine: friction, inertia, feed-forward, delays, gains of its drives, with confidence
+    Identify(identify::IdentifyArguments),
     /// A trace as a page to look at: plots, path, tables, program
     Report(report::ReportArguments),
+    /// Feed-forward gains and their delay, from programs or measured traces
+    Tune(tune::TuneArguments),
     /// A recording as CSV
     Export(export::ExportArguments),
     /// Rescue what an interrupted run left
     Recover(recover::RecoverArguments),
-    /// Machine files: check, list, show, schema, frequency responses
+    /// Machine files: check, list, show, schema, frequency responses; SINUMERIK machine data in and out
     Machine(machine::MachineArguments),
     /// What a code such as E0104 means, and what to do
     Explain(explain::ExplainArguments),
@@ -90,7 +102,9 @@ pub fn main() -> ExitCode {
         Command::Moves(arguments) => (moves::moves(arguments), arguments.json),
         Command::Follow(arguments) => (follow::follow(arguments), arguments.json),
         Command::Compare(arguments) => (compare::compare(arguments), arguments.json),
+        Command::Identify(arguments) => (identify::identify(arguments), arguments.json),
         Command::Report(arguments) => (report::report(arguments), arguments.json),
+        Command::Tune(arguments) => (tune::tune(arguments), arguments.json),
         Command::Export(arguments) => (export::export(arguments), arguments.json),
         Command::Recover(arguments) => (recover::recover(arguments), arguments.json),
         Command::Machine(arguments) => (machine::machine(arguments), arguments.json()),

@@ -211,14 +211,20 @@ impl AxisDrive {
         self.current_mean_a = current_sum_a / f64::from(tick);
     }
 
+    /// From now on the speed set-point goes from `velocity_lu_s` to 0 within `time_s`, whatever the position: as after an alarm.
+    pub fn brake(&mut self, velocity_lu_s: f64, time_s: f64) {
+        self.position_loop.brake(velocity_lu_s, time_s);
+    }
+
     /// What stands before the speed loop: set-point preparation, position loop, monitoring.
     #[inline(always)]
     pub(super) fn begin(&mut self, input: &DriveInput) -> Beginning {
+        self.position_loop.brake_on(self.position_period_s);
         let filtered_lu = self.jerk_filter.step(input.position_setpoint_lu);
         let terms = self.feedforward.terms(filtered_lu, input.feedforward_active);
         let correction = self.reversal.step(terms.set_velocity_lu_s);
         let position = self.position_control(terms.reference_lu, &terms, &correction);
-        let view = self.monitor.watch(input.position_setpoint_lu, position.measured_lu);
+        let view = self.monitor.watch(input.position_setpoint_lu, position.measured_lu, position.command.clamped);
         if !self.stiffness_control {
             self.monitor.advance(position.reference_lu, terms.velocity_lu_s, self.position_period_s);
         }

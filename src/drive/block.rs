@@ -273,6 +273,7 @@ fn run<const N: usize>(laws: &Laws<N>, held: &Held<N>, state: &mut State<N>, cyc
 }
 
 /// All speed controllers: i_ref.
+#[allow(clippy::needless_range_loop, reason = "several arrays side by side, one lane each")]
 #[inline(always)]
 fn speed_control<const N: usize>(laws: &Laws<N>, held: &Held<N>, now: &mut State<N>) -> Lanes<N> {
     let mut current_reference_a = [0.0; N];
@@ -294,6 +295,7 @@ fn speed_control<const N: usize>(laws: &Laws<N>, held: &Held<N>, now: &mut State
 }
 
 /// All current controllers and plants.
+#[allow(clippy::needless_range_loop, reason = "several arrays side by side, one lane each")]
 #[inline(always)]
 fn current_cycle<const N: usize>(
     laws: &Laws<N>,
@@ -349,6 +351,7 @@ impl<const N: usize> Seen<N> {
     }
 
     /// 1 for an axis that may not have gone on as it was.
+    #[allow(clippy::needless_range_loop, reason = "several arrays side by side, one lane each")]
     #[inline(always)]
     fn happened(&self, laws: &Laws<N>, now: &State<N>) -> Lanes<N> {
         let mut happened = [0.0; N];

@@ -42,6 +42,13 @@ impl Drive {
         }
     }
 
+    /// See [`AxisDrive::brake`]; an ideal axis stands where its set-point does.
+    pub fn brake(&mut self, velocity_lu_s: f64, time_s: f64) {
+        if let Self::Cascade(drive) = self {
+            drive.brake(velocity_lu_s, time_s);
+        }
+    }
+
     /// False when the axis has diverged: see [`AxisDrive::is_finite`].
     pub fn is_finite(&self) -> bool {
         match self {

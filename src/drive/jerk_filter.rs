@@ -1,11 +1,15 @@
 //! Jerk filter of the set-point: MD32400 to MD32414, in front of position controller and feed-forward.
 //!
+//! The FIR low-pass (MD32402 = 5), whose weights the manuals do not print, is a sinc up to its cut-off frequency (MD32412) under a Hamming window over
+//! its time (MD32410), sum 1: symmetric, so that it delays every motion by half its length less half a cycle, whatever the frequency.
+//!
 //! In: x_set, once a position cycle. Out: the filtered set-point, which the controller follows. The filter delays: by half its
 //! time (a moving average), by its time (second order). The following error is counted from the set-point in front of it.
 
 use super::filter::Section;
 use crate::machine::{Filter, FilterShape, JerkFilter as Data, JerkFilterKind};
 use nalgebra::Complex;
+use std::f64::consts::TAU;
 
 /// Mean of the last samples.
 #[derive(Clone, Debug)]
@@ -31,6 +35,21 @@ impl MovingAverage {
         sample + below / self.samples.len() as f64
     }
 
+    /// Samples from the newest to the oldest, with their places.
+    fn weighted(&mut self, sample: f64, weights: &[f64]) -> f64 {
+        self.samples[self.oldest] = sample;
+        let newest = self.oldest;
+        let count = self.samples.len();
+        self.oldest = if self.oldest + 1 == count { 0 } else { self.oldest + 1 };
+        // Differences to the newest, as above.
+        let off: f64 = weights
+            .iter()
+            .enumerate()
+            .map(|(age, weight)| weight * (self.samples[(newest + count - age) % count] - sample))
+            .sum();
+        sample + off
+    }
+
     /// Mean of 1, q, q², ...
     fn response(&self, q: Complex<f64>) -> Complex<f64> {
         let sum = (0..self.samples.len()).fold(Complex::new(0.0, 0.0), |sum, _| sum * q + 1.0);
@@ -49,6 +68,8 @@ pub(super) enum JerkFilter {
     Average(MovingAverage),
     /// MD32402 = 4.
     Double(MovingAverage, MovingAverage),
+    /// MD32402 = 5: the last samples and their weights, the newest first.
+    Fir(MovingAverage, Box<[f64]>),
 }
 
 impl JerkFilter {
@@ -61,6 +82,11 @@ impl JerkFilter {
             JerkFilterKind::BandStop => section(Filter { shape: FilterShape::SecondOrder, ..data.band_stop() }),
             JerkFilterKind::MovingAverage => Self::Average(average(data.time_s)),
             JerkFilterKind::DoubleMovingAverage => Self::Double(average(data.time_s), average(data.time_add_s)),
+            JerkFilterKind::FirLowPass => {
+                let samples = average(data.time_s);
+                let weights = low_pass_weights(samples.samples.len(), data.frequency_hz * period_s);
+                Self::Fir(samples, weights)
+            }
         }
     }
 
@@ -72,6 +98,7 @@ impl JerkFilter {
             Self::Section(section) => section.step(setpoint_lu),
             Self::Average(average) => average.step(setpoint_lu),
             Self::Double(first, second) => second.step(first.step(setpoint_lu)),
+            Self::Fir(samples, weights) => samples.weighted(setpoint_lu, weights),
         }
     }
 
@@ -82,6 +109,21 @@ impl JerkFilter {
             Self::Section(section) => section.response(q),
             Self::Average(average) => average.response(q),
             Self::Double(first, second) => first.response(q) * second.response(q),
+            Self::Fir(_, weights) => weights.iter().rev().fold(Complex::new(0.0, 0.0), |sum, weight| sum * q + weight),
         }
     }
+}
+
+/// Sinc under a Hamming window; `cutoff_ratio` is the frequency over the sampling frequency.
+fn low_pass_weights(count: usize, cutoff_ratio: f64) -> Box<[f64]> {
+    let middle = (count as f64 - 1.0) / 2.0;
+    let weight = |i: usize| {
+        let from_middle = i as f64 - middle;
+        let x = TAU * cutoff_ratio * from_middle;
+        let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
+        let window = if count > 1 { 0.54 - 0.46 * (TAU * i as f64 / (count as f64 - 1.0)).cos() } else { 1.0 };
+        sinc * window
+    };
+    let sum: f64 = (0..count).map(weight).sum();
+    (0..count).map(|i| weight(i) / sum).collect()
 }

@@ -10,8 +10,8 @@
 //!
 //! What a SINUMERIK axis has besides is off unless asked for: `jerk_filter` before all, `filter` around the speed loop, `reversal`,
 //! `backlash`, `pitch_error` of a screw, and `second_mass`, a load behind a spring. `axis_drive` wires the boxes; `linear_model` and `frequency` are what the boxes do to a sine; `choice` lets the kernel treat an axis without drive data (`ideal`) alike; `plain` is
-//! the short way of an axis without all that, `batch` steps many drives at once, `block` by `block`. `docs/drive.md` has picture, law and
-//! code side by side.
+//! the short way of an axis without all that, `batch` steps many drives at once, `block` by `block`; `spindle` is how the master spindle
+//! lags. `docs/drive.md` has picture, law and code side by side.
 
 mod axis_drive;
 mod backlash;
@@ -37,6 +37,7 @@ mod position_loop;
 mod reversal;
 mod second_mass;
 mod speed_loop;
+mod spindle;
 mod transition;
 mod wire;
 
@@ -47,4 +48,5 @@ pub use frequency::{FrequencyResponses, GainMargin, LOWEST_HZ, LoopResponse, Pha
 pub use ideal::IdealDrive;
 pub use plant::{Piece, Plant, PlantState};
 pub use second_mass::{TwoMass, TwoMassPiece, TwoMassState};
+pub use spindle::{SpindleLag, SpindleSignals};
 pub use wire::*;

@@ -1,7 +1,7 @@
-//! What the control watches: exact-stop windows, contour, positioning and standstill monitoring (MD36000 to MD36040, MD36400).
+//! What the control watches: exact-stop windows, contour, positioning and standstill monitoring (MD36000 to MD36040, MD36400), speed set-point at its limit (MD36220).
 //!
-//! In: once a position cycle the set-point, the reference and the velocity feed-forward of the position controller, and the measured
-//! position. Out: [`View`]: contour deviation, and bits of [`monitoring`](super::wire::monitoring). Watches only: the kernel makes alarms
+//! In: once a position cycle the set-point, the reference and the velocity feed-forward of the position controller, the measured
+//! position, and whether the speed set-point is at its limit. Out: [`View`]: contour deviation, and bits of [`monitoring`](super::wire::monitoring). Watches only: the kernel makes alarms
 //! of the bits, and block ends of the windows.
 
 use super::limit::limited;
@@ -41,6 +41,8 @@ pub(super) struct Monitor {
     rest_cycles: u64,
     /// The axis has been in the fine window since then.
     arrived: bool,
+    /// Position cycles in which the speed set-point has been at its limit.
+    limited_cycles: u64,
 }
 
 impl Monitor {
@@ -59,16 +61,20 @@ impl Monitor {
             setpoint_before_lu: position_lu,
             rest_cycles: 0,
             arrived: true,
+            limited_cycles: 0,
         }
     }
 
     /// One position cycle, before the model moves on.
     #[inline]
-    pub(super) fn watch(&mut self, setpoint_lu: f64, measured_lu: f64) -> View {
+    pub(super) fn watch(&mut self, setpoint_lu: f64, measured_lu: f64, limited: bool) -> View {
         let contour_deviation_lu = self.model.position_lu - measured_lu;
         let mut seen = 0;
         let mut set = |holds: bool, bit: u32| seen |= if holds { bit } else { 0 };
         set(contour_deviation_lu.abs() > self.limits.contour_lu, bits::CONTOUR);
+        self.limited_cycles = if limited { self.limited_cycles + 1 } else { 0 };
+        let limited_s = self.limited_cycles as f64 * self.period_s;
+        set(limited && limited_s > self.limits.speed_limit_time_s, bits::SPEED_LIMIT);
         let rests = (setpoint_lu - self.setpoint_before_lu).abs() <= REST_LU;
         self.setpoint_before_lu = setpoint_lu;
         if rests {

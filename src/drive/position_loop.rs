@@ -27,6 +27,8 @@ pub(super) struct PositionLoop {
     velocity_max_lu_s: f64,
     /// r.
     transmission_lu_per_rad: f64,
+    /// After an alarm: the speed set-point, and what it loses each second. In place of the position.
+    braking: Option<[f64; 2]>,
 }
 
 impl PositionLoop {
@@ -35,6 +37,21 @@ impl PositionLoop {
             gain_per_s: data.position_gain_per_s,
             velocity_max_lu_s: data.speed_setpoint_max_lu_s,
             transmission_lu_per_rad: data.mechanics.transmission_lu_per_rad,
+            braking: None,
+        }
+    }
+
+    /// From now on a ramp from `velocity_lu_s` to 0 within `time_s`, in speed control.
+    pub(super) fn brake(&mut self, velocity_lu_s: f64, time_s: f64) {
+        self.braking = Some([velocity_lu_s, velocity_lu_s / time_s]);
+    }
+
+    /// The ramp goes on by one position cycle.
+    #[inline(always)]
+    pub(super) fn brake_on(&mut self, period_s: f64) {
+        if let Some([velocity_lu_s, rate]) = &mut self.braking {
+            let left_lu_s = *velocity_lu_s - *rate * period_s;
+            *velocity_lu_s = if left_lu_s * *rate > 0.0 { left_lu_s } else { 0.0 };
         }
     }
 
@@ -43,6 +60,11 @@ impl PositionLoop {
     pub(super) fn step(&self, reference_lu: f64, measured_lu: f64, velocity_feedforward_lu_s: f64) -> SpeedCommand {
         let deviation_lu = reference_lu - measured_lu;
         let wanted_lu_s = self.gain_per_s * deviation_lu + velocity_feedforward_lu_s;
+        let (wanted_lu_s, deviation_lu) = match self.braking {
+            None => (wanted_lu_s, deviation_lu),
+            // The control follows up: there is no deviation.
+            Some([velocity_lu_s, _]) => (velocity_lu_s, 0.0),
+        };
         let velocity_lu_s = limited(wanted_lu_s, self.velocity_max_lu_s);
         SpeedCommand {
             deviation_lu,

@@ -2,9 +2,13 @@
 //! compensation (MD32450).
 //!
 //! In: the set velocity of a position cycle. Out: a pulse on the velocity command, and the correction of the measured position.
-//! The pulse has one amplitude (MD32520): its adaptation to the acceleration (MD32510) is not modelled.
+//! With MD32510 the amplitude depends on the acceleration a of the set-point at the reversal:
+//!
+//! ```text
+//! a < a1: max a / a1      a1 .. a2: max      a2 .. a3: max (1 - (a - a2) / (a3 - a2)), at least min      a > a3: min
+//! ```
 
-use crate::machine::DriveOptions;
+use crate::machine::{DriveOptions, FrictionAdaptation};
 
 /// Slower is standstill: rounding of the set-point must not count as a reversal.
 const STANDSTILL_LU_S: f64 = 1e-9;
@@ -23,6 +27,10 @@ pub(super) struct Correction {
 pub(super) struct Reversal {
     active: bool,
     amplitude_lu_s: f64,
+    adaptation: Option<FrictionAdaptation>,
+    period_s: f64,
+    /// Set velocity of the cycle before.
+    velocity_before_lu_s: f64,
     /// exp(-T_p / T), MD32540.
     decay_ratio: f64,
     backlash_lu: f64,
@@ -37,10 +45,30 @@ impl Reversal {
         Self {
             active: amplitude_lu_s != 0.0 || backlash_lu != 0.0,
             amplitude_lu_s,
+            adaptation: options.friction_adaptation,
+            period_s,
+            velocity_before_lu_s: 0.0,
             decay_ratio: (-period_s / options.friction_pulse_time_s).exp(),
             backlash_lu,
             direction: 0.0,
             pulse_lu_s: 0.0,
+        }
+    }
+
+    /// Of the pulse, at an acceleration.
+    fn amplitude(&self, acceleration_lu_s2: f64) -> f64 {
+        let (a, most) = (acceleration_lu_s2, self.amplitude_lu_s);
+        let Some(FrictionAdaptation { lowest_lu_s, accelerations_lu_s2: [a1, a2, a3] }) = self.adaptation else {
+            return most;
+        };
+        if a < a1 {
+            most * a / a1
+        } else if a <= a2 {
+            most
+        } else if a < a3 {
+            (most * (1.0 - (a - a2) / (a3 - a2))).max(lowest_lu_s)
+        } else {
+            lowest_lu_s
         }
     }
 
@@ -54,10 +82,12 @@ impl Reversal {
         if velocity_lu_s.abs() > STANDSTILL_LU_S {
             let direction = 1f64.copysign(velocity_lu_s);
             if direction * self.direction < 0.0 {
-                self.pulse_lu_s = direction * self.amplitude_lu_s;
+                let acceleration_lu_s2 = (velocity_lu_s - self.velocity_before_lu_s).abs() / self.period_s;
+                self.pulse_lu_s = direction * self.amplitude(acceleration_lu_s2);
             }
             self.direction = direction;
         }
+        self.velocity_before_lu_s = velocity_lu_s;
         // The motor is half the play ahead of the load, in the direction of motion.
         Correction { velocity_lu_s: self.pulse_lu_s, position_lu: -0.5 * self.backlash_lu * self.direction }
     }

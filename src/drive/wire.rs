@@ -62,6 +62,8 @@ pub mod monitoring {
     pub const POSITIONING: u32 = 8;
     /// MD36040 after the end of a motion the axis is away by more than MD36030.
     pub const STANDSTILL: u32 = 16;
+    /// The speed set-point has been at its limit for longer than MD36220.
+    pub const SPEED_LIMIT: u32 = 32;
 }
 
 /// Bits of [`AxisSignals::flags`].

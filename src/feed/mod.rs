@@ -22,6 +22,7 @@ mod scan;
 mod spindle;
 mod split;
 mod synchronised;
+mod thread;
 mod varying;
 mod wire;
 mod worst;

@@ -7,7 +7,9 @@
 //! fixed stays possible. (A ramp ends without acceleration, so that a *higher* speed at the end of a piece may ask for a *lower* one
 //! at its start. Where the speed at the end can still rise, the speed at the start is therefore one from which any of them can be
 //! met; it is exact where the speed at the end is settled.) A forward pass is one step: the piece at hand begins with the speed that the one before was left with.
-//! Does not sample, and does not know axes: `limits` and `junction` do.
+//! A thread has a law of its own, which the spindle gives it: the path rests before and after it.
+//! Where drives are simulated, block ends wait for the axes: nothing beyond such an end is planned before its wait is told
+//! ([`Planner::tell_waited`]), so that all times here are those of the run. Does not sample, and does not know axes: `limits` and `junction` do.
 
 use super::continuous::{Continuous, Flow};
 use super::feed_override::{OverrideCourse, OverrideSchedule};
@@ -20,21 +22,25 @@ use super::published::{self, Tally};
 use super::spindle::Spindle;
 use super::split::{self, Part};
 use super::synchronised::SynchronisedActions;
+use super::thread::{Before, ThreadPiece};
 use super::{Limit, LimitKind, PlannedPiece, TimeLaw, varying};
 use crate::base::{Diagnostic, PerAxis};
 use crate::geometry::Curve;
-use crate::interpreter::Feed;
+use crate::interpreter::{Event, Feed};
 use crate::kinematics::JointPath;
 use crate::machine::{BlendLaw, Machine, TimeLawKind};
 use crate::program::BlockRef;
-use crate::smoothing::{ContourPiece, PieceKind};
+use crate::smoothing::PieceKind;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 mod checks;
 mod flowing;
+mod with_spindle;
+mod waits;
 
 use checks::{check_flow, check_motion, check_time};
+use waits::Waits;
 
 /// Plans speeds over a window of the path.
 #[derive(Clone, Debug)]
@@ -66,8 +72,14 @@ pub struct Planner {
     cutting_s: f64,
     /// Axes that move on their own.
     arrivals: Arrivals,
-    /// What feeds wait for; `None`: they do not.
-    spindle: Option<Spindle>,
+    spindle: Spindle,
+    /// The thread that was pushed last, if the path does not rest after it.
+    last_thread: Option<Before>,
+    /// What a person should know, with its block.
+    findings: Vec<(BlockRef, Diagnostic)>,
+    /// A spindle that cannot follow a constant cutting speed has been told of.
+    late_told: bool,
+    waits: Waits,
     /// What the printed blend law did.
     published: Tally,
     /// Where it came to a stand first, and whether that has been told.
@@ -124,7 +136,9 @@ enum Motion {
     Waits { time_s: f64 },
     /// Stands still until these axes have arrived.
     WaitsFor { axes: PerAxis<bool> },
-    /// Stands still until the spindle is near its speed.
+    /// Follows the spindle, or leads it.
+    Threads(Box<ThreadPiece>),
+    /// Stands still until the spindle is near its speed or at its position.
     WaitsForSpindle,
     /// Takes neither way nor time: speed passes through it.
     Nothing,
@@ -150,6 +164,10 @@ impl Planner {
             cutting_s: 0.0,
             arrivals: Arrivals::new(),
             spindle: Spindle::new(machine.spindle),
+            last_thread: None,
+            findings: Vec::new(),
+            late_told: false,
+            waits: Waits::default(),
             published: Tally::default(),
             stalled: None,
             half_blend_lu: 0.0,
@@ -184,6 +202,9 @@ impl Planner {
 
     /// What a person should know about the laws handed out so far, with the block where it began; each once.
     pub fn take_warning(&mut self) -> Option<(BlockRef, Diagnostic)> {
+        if !self.findings.is_empty() {
+            return Some(self.findings.remove(0));
+        }
         std::mem::take(&mut self.published).warning()
     }
 
@@ -219,7 +240,14 @@ impl Planner {
         let contour = &path.contour;
         let mut rests_after = contour.stop_at_end;
         let mut corner = FREE;
+        let last_thread = self.last_thread.take();
         let motion = match &contour.kind {
+            PieceKind::Block(curve) if contour.modes.thread.is_some() && curve.length_lu() != 0.0 => {
+                let ends = Ends { start: path.at(0.0), end: path.at(f64::INFINITY), blend: false, rotary_only: false };
+                let piece = self.thread(&path, ends, last_thread)?;
+                corner = if piece.goes_on { FREE } else { STOP };
+                Motion::Threads(Box::new(piece))
+            }
             // A length that is no number is not 0 either.
             PieceKind::Block(curve) | PieceKind::Blend(curve, _) if curve.length_lu() != 0.0 => {
                 let length_lu = curve.length_lu();
@@ -251,6 +279,10 @@ impl Planner {
                 (corner, rests_after) = (STOP, true);
                 Motion::Waits { time_s: *time_s }
             }
+            PieceKind::Wait { .. } if contour.events.contains(&Event::SpindleWait) => {
+                (corner, rests_after) = (STOP, true);
+                Motion::WaitsForSpindle
+            }
             PieceKind::WaitPositioned { axes, .. } => {
                 (corner, rests_after) = (STOP, true);
                 Motion::WaitsFor { axes: *axes }
@@ -262,34 +294,6 @@ impl Planner {
         }
         self.entries.push_back(Entry { path, motion, corner, rests_after, entry: REST });
         Ok(())
-    }
-
-    /// Before a feed that follows a change of the spindle speed, or begins with one, the path rests. What happens when the piece begins happens
-    /// when the wait does.
-    fn wait_for_spindle(&mut self, path: &mut JointPath) {
-        let contour = &mut path.contour;
-        let curve = contour.curve().filter(|curve| curve.length_lu() != 0.0);
-        let feeds = curve.is_some() && contour.feed != Feed::Rapid;
-        if !self.spindle.as_mut().is_some_and(|spindle| spindle.push(&contour.events, feeds)) {
-            return;
-        }
-        let Some(at) = contour.curve().map(Curve::start) else { return };
-        let wait = ContourPiece {
-            kind: PieceKind::Wait { time_s: 0.0, at },
-            events: std::mem::take(&mut contour.events),
-            blocks_begun: 0,
-            block_length_lu: None,
-            stop_at_end: true,
-            ..contour.clone()
-        };
-        self.last = None;
-        self.entries.push_back(Entry {
-            path: JointPath { contour: wait, transformation: path.transformation.clone() },
-            motion: Motion::WaitsForSpindle,
-            corner: STOP,
-            rests_after: true,
-            entry: REST,
-        });
     }
 
     /// No more pieces: the path ends at rest.
@@ -306,6 +310,7 @@ impl Planner {
         if self.admitted == 0 || self.held.is_some() || !(self.full || self.finished || self.rests > 0) {
             return None;
         }
+        let waits_at_end = self.waits_at_end()?;
         self.actions.begin(&self.entries.front()?.path, self.elapsed_s);
         let flowing = self.flow();
         if self.continuous.is_none() {
@@ -317,25 +322,28 @@ impl Planner {
         let events = &front.path.contour.events;
         let positionings =
             if events.is_empty() { Vec::new() } else { self.arrivals.set_out(machine, events, self.elapsed_s) };
-        if let Some(spindle) = &mut self.spindle {
-            spindle.begin(events, self.elapsed_s);
-        }
+        self.spindle.begin(events, self.elapsed_s);
+        let mut spindle = self.spindle.hand_out(self.elapsed_s);
         let (law, exit) = match &front.motion {
             Motion::WaitsFor { axes } => {
                 let (time_s, limit) = self.arrivals.wait(machine, axes, self.elapsed_s);
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
             Motion::WaitsForSpindle => {
-                let time_s = self.spindle.as_ref().map_or(0.0, Spindle::ready_s) - self.elapsed_s;
+                let time_s = self.spindle.ready_s() - self.elapsed_s;
                 let limit = Limit { kind: LimitKind::Spindle, axis: None };
                 (if time_s > 0.0 { standstill(time_s, limit) } else { TimeLaw::new([]) }, STOP)
             }
             Motion::Flows(_) => (flowing.unwrap_or_default(), STOP),
+            Motion::Threads(piece) => (self.thread_law(piece, &front, &mut spindle), STOP),
             _ => match self.printed_law(&front, ahead) {
                 Some(printed) => printed,
                 None => front.fixed(self.entry, ahead, self.setpoint_period_s),
             },
         };
+        if let Some(tracked) = self.track_cutting(&front.path, &law) {
+            spindle = Some(tracked);
+        }
         if self.continuous.is_some() && !matches!(front.motion, Motion::Flows(_)) {
             self.stand_by(&front.path, &law);
         }
@@ -343,11 +351,15 @@ impl Planner {
         let start_s = self.elapsed_s;
         self.elapsed_s += law.duration_s();
         let overrides = self.overrides.steps(start_s, self.elapsed_s);
-        if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_)) && front.path.contour.feed != Feed::Rapid {
+        if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_) | Motion::Threads(_))
+            && front.path.contour.feed != Feed::Rapid
+        {
             self.cutting_s += law.duration_s();
         }
+        self.waits.begin(waits_at_end, &front.path);
+        let buffered_blocks = self.blocks_beyond;
         let piece =
-            PlannedPiece { path: front.path, law, buffered_blocks: self.blocks_beyond, positionings, overrides };
+            PlannedPiece { path: front.path, law, buffered_blocks, positionings, overrides, spindle, waits_at_end };
         self.entry = exit;
         self.admitted -= 1;
         self.changed_from = self.changed_from.saturating_sub(1);
@@ -440,7 +452,9 @@ impl Planner {
                     self.changed_from = self.changed_from.min(before);
                 }
             }
-            Motion::Waits { .. } | Motion::WaitsFor { .. } | Motion::WaitsForSpindle => self.half_blend_lu = 0.0,
+            Motion::Waits { .. } | Motion::WaitsFor { .. } | Motion::WaitsForSpindle | Motion::Threads(_) => {
+                self.half_blend_lu = 0.0;
+            }
             Motion::Flows(_) | Motion::Nothing => {}
         }
     }
@@ -515,7 +529,9 @@ impl Entry {
             }
             Motion::Waits { time_s } => (standstill(*time_s, Limit { kind: LimitKind::Dwell, axis: None }), STOP),
             // A wait for axes gets its time where it is handed out.
-            Motion::WaitsFor { .. } | Motion::WaitsForSpindle | Motion::Flows(_) => (TimeLaw::new([]), STOP),
+            Motion::WaitsFor { .. } | Motion::WaitsForSpindle | Motion::Threads(_) | Motion::Flows(_) => {
+                (TimeLaw::new([]), STOP)
+            }
             Motion::Nothing => (TimeLaw::new([]), ahead.min(entry)),
         }
     }
@@ -531,7 +547,7 @@ impl Motion {
             }),
             Self::Moves { limits, .. } => limits.cap,
             Self::Waits { .. } | Self::WaitsFor { .. } | Self::WaitsForSpindle => STOP,
-            Self::Flows(_) | Self::Nothing => FREE,
+            Self::Flows(_) | Self::Threads(_) | Self::Nothing => FREE,
         }
     }
 
@@ -553,7 +569,7 @@ impl Motion {
                 let limit = if exit == REST { cap.limit } else { exit.cap.limit };
                 Planned { cap: SpeedCap { limit, ..cap }, settled: exit.settled }
             }
-            Self::Waits { .. } | Self::WaitsFor { .. } | Self::WaitsForSpindle => REST,
+            Self::Waits { .. } | Self::WaitsFor { .. } | Self::WaitsForSpindle | Self::Threads(_) => REST,
             Self::Flows(_) | Self::Nothing => exit,
         }
     }

@@ -1,9 +1,10 @@
 //! The wire out of feed.
 //!
-//! In: nothing (plain data). Out: [`PlannedPiece`], [`TimeLaw`] and [`Limit`]. Does not plan.
+//! In: nothing (plain data). Out: [`PlannedPiece`], [`TimeLaw`], [`SpindleMotion`] and [`Limit`]. Does not plan.
 
 use crate::base::AxisId;
 use crate::kinematics::JointPath;
+use std::sync::Arc;
 
 /// What holds the motion back at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -228,6 +229,51 @@ pub struct PlannedPiece {
     pub positionings: Vec<AxisMotion>,
     /// The feed override at its start, and its changes after that; empty where it is 100 % from end to end.
     pub overrides: Vec<OverrideStep>,
+    /// The master spindle from here on, where its motion is another one than before.
+    pub spindle: Option<SpindleMotion>,
+    /// The next piece begins only when the axes are in position.
+    pub waits_at_end: bool,
+}
+
+/// How the master spindle moves from the start of a piece on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpindleMotion {
+    /// In order; times from the start of the piece, the first one at or before it. The last one goes on.
+    pub phases: Arc<[SpindlePhase]>,
+    /// G331, G332: turned on by so much per unit of the piece's path on top of that.
+    pub follows_rad_per_lu: Option<f64>,
+}
+
+/// A stretch of constant acceleration of the spindle, which is also its state where it begins. Right-handed (M3) is positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpindlePhase {
+    /// When it begins.
+    pub from_s: f64,
+    /// Angle there, all revolutions counted.
+    pub angle_rad: f64,
+    /// Speed there.
+    pub speed_rad_s: f64,
+    /// Acceleration all along.
+    pub acceleration_rad_s2: f64,
+}
+
+impl SpindlePhase {
+    /// State at a time, if nothing follows.
+    pub fn at(&self, time_s: f64) -> Self {
+        let t = time_s - self.from_s;
+        Self {
+            from_s: time_s,
+            angle_rad: self.angle_rad + t * (self.speed_rad_s + t * self.acceleration_rad_s2 / 2.0),
+            speed_rad_s: self.speed_rad_s + t * self.acceleration_rad_s2,
+            ..*self
+        }
+    }
+
+    /// State at a time: of the last of `phases` that has begun, of the first before that.
+    pub fn of(phases: &[Self], time_s: f64) -> Self {
+        let begun = phases.partition_point(|phase| phase.from_s <= time_s).saturating_sub(1);
+        phases.get(begun).map_or(Self { from_s: time_s, ..Self::default() }, |phase| phase.at(time_s))
+    }
 }
 
 /// The feed override from a time on.

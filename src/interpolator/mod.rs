@@ -6,6 +6,7 @@
 mod fine;
 mod overlay;
 mod sampler;
+mod spindle_course;
 mod wire;
 
 pub use fine::FineInterpolator;

@@ -6,12 +6,12 @@
 //! rounded to ticks and t_s is never summed up. Positions come from the curve, not from integration. Row 0 is the start posture;
 //! the last row is the end posture at rest, on the first tick at or after the end of the last law.
 //!
-//! Where drives are simulated ([`Interpolator::waiting_in_position`]) a block that ends in an exact stop (G60, G9 with G601 or G602), or in front of a
-//! block that rests the path (G4, M0, M6, STOPRE), or that waits for axes on their own way (POS, WAITP), ends when it is told so ([`Interpolator::release`]): until then its last set-point stands, and the
-//! next piece begins on a tick. The end of the program is not waited for under the continuous modes.
+//! Where drives are simulated ([`Interpolator::waiting_in_position`]) a piece that the planner has marked (`waits_at_end`) ends when it is told so
+//! ([`Interpolator::release`]): until then its last set-point stands, and the next piece begins on a tick.
 //! Does not plan, does not know what events mean, nor where the axes are.
 
 use super::overlay::Overlay;
+use super::spindle_course::SpindleCourse;
 use super::{AxisSetpoint, ExactStopWait, PathSample, Setpoint};
 use crate::base::{AxisVector, PerAxis, TimeBase};
 use crate::feed::{Limit, LimitKind, PathState, PlannedPiece, ProgrammedTime};
@@ -41,6 +41,7 @@ pub struct Interpolator {
     ended: bool,
     /// Axes on their own way.
     overlay: Overlay,
+    spindle: SpindleCourse,
     programmed: ProgrammedTime,
     /// Block ends wait for the axes.
     waits: bool,
@@ -119,6 +120,7 @@ impl Interpolator {
             begun: Vec::with_capacity(BEGUN_USUAL),
             ended: false,
             overlay: Overlay::new(machine),
+            spindle: SpindleCourse::new(machine.cycle.time_base),
             programmed: ProgrammedTime::new(machine),
             waits: false,
             hold: None,
@@ -196,7 +198,7 @@ impl Interpolator {
                 }
                 Some(_) => return Some(self.standing(k, active)),
                 None => {
-                    if self.must_wait(next) {
+                    if self.waits && active.piece.waits_at_end {
                         self.hold = Some(Hold { since_k: k, carry_s: -left_s, released_k: None });
                         let active = self.active.as_ref()?;
                         return Some(self.setpoint_of(k, active, active.at_end(), active.piece.law.duration_s()));
@@ -220,33 +222,6 @@ impl Interpolator {
                 }
             }
         }
-    }
-
-    /// Whether the piece that has ended waits for the axes.
-    fn must_wait(&mut self, next: &mut impl FnMut() -> Option<PlannedPiece>) -> bool {
-        let Some(contour) = self.active.as_ref().filter(|_| self.waits).map(|active| &active.piece.path.contour) else {
-            return false;
-        };
-        let ends = |event: &Event| matches!(event, Event::MFunction(2 | 17 | 30));
-        if matches!(contour.kind, PieceKind::WaitPositioned { .. }) {
-            return !contour.events.iter().any(ends);
-        }
-        let moves = contour.curve().is_some_and(|curve| curve.length_lu() > 0.0);
-        if !contour.stop_at_end || !moves || contour.modes.exact_stop == ExactStop::Setpoint {
-            return false;
-        }
-        if contour.modes.path_mode == PathMode::ExactStop {
-            return true;
-        }
-        if self.next.is_none() {
-            self.next = next();
-        }
-        let rests = |piece: &PlannedPiece| {
-            // M0, M6, G4, STOPRE: for these the axes must be where they should be. The program may end before they are.
-            let contour = &piece.path.contour;
-            matches!(contour.kind, PieceKind::Wait { .. }) && !contour.events.iter().any(ends)
-        };
-        self.next.as_ref().is_some_and(rests)
     }
 
     /// The end of the active piece, while the axes are waited for.
@@ -287,6 +262,7 @@ impl Interpolator {
         for motion in piece.positionings.drain(..) {
             self.overlay.set_out(motion, k, carry_s);
         }
+        self.spindle.take(piece.spindle.take(), k, carry_s);
         let programmed_feed_lu_s = self.programmed.feed_lu_s(&piece.path);
         let programmed_time_s = self.programmed.time_s(&piece.path).unwrap_or(piece.law.duration_s());
         let contour = &mut piece.path.contour;
@@ -357,6 +333,7 @@ impl Interpolator {
             },
             feedforward_active: contour.modes.feedforward_active,
             tool_length: contour.modes.tool.as_ref().map_or(AxisVector::zero(), |tool| tool.length),
+            spindle: self.spindle.at(k, &PathState { position_lu: s_lu, velocity_lu_s: v, ..state }),
         }
     }
 }

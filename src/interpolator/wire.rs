@@ -33,6 +33,19 @@ pub struct Setpoint {
     pub feedforward_active: bool,
     /// Length of the active tool: position of the axes minus position of the tip.
     pub tool_length: AxisVector,
+    /// The master spindle.
+    pub spindle: SpindleSetpoint,
+}
+
+/// Set-point of the master spindle; right-handed (M3) is positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpindleSetpoint {
+    /// Angle, all revolutions counted.
+    pub angle_rad: f64,
+    /// Speed.
+    pub speed_rad_s: f64,
+    /// Acceleration.
+    pub acceleration_rad_s2: f64,
 }
 
 /// State of the path at a set-point: the topic `/path`.

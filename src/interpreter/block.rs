@@ -20,6 +20,8 @@ use std::sync::Arc;
 
 /// M6: the tool change comes before the motion of its block, at rest.
 const TOOL_CHANGE: u32 = 6;
+/// M19: the spindle is positioned.
+const SPINDLE_POSITION: u32 = 19;
 /// M0, M1: stop. M2, M17, M30: end. They come after the motion of their block.
 const STOPS: [u32; 5] = [0, 1, 2, 17, 30];
 const ENDS: [u32; 3] = [2, 17, 30];
@@ -49,6 +51,8 @@ pub(super) struct Collected {
     pub pole: Option<(PoleOrigin, Columns)>,
     /// RND, CHF, CHR, FRC.
     pub corner: CornerWords,
+    /// SPOS, M19, WAITS: the block ends when the master spindle has arrived.
+    pub waits_for_spindle: bool,
     /// Output with the motion.
     pub events: Vec<Event>,
     /// T and M6: output before the motion where the block has an M6.
@@ -104,6 +108,7 @@ impl Interpreter {
         } else {
             // Before S: with G25 and G26 it is a limit.
             self.frame_request(&mut block)?;
+            self.take_lead_change(&mut block)?;
             self.take_feed(&mut block)?;
             self.pole_request(&mut block)?;
             self.act(&mut block)?;
@@ -141,6 +146,9 @@ impl Interpreter {
             self.emit_function(events, false);
         }
         self.finish_positions(block);
+        if block.waits_for_spindle {
+            self.emit_function(vec![Event::SpindleWait], true);
+        }
         Ok(())
     }
 
@@ -253,6 +261,7 @@ impl Interpreter {
             GFunction::Line => self.modal.motion = Motion::Line,
             GFunction::Clockwise => self.modal.motion = Motion::Clockwise,
             GFunction::CounterClockwise => self.modal.motion = Motion::CounterClockwise,
+            GFunction::Thread(word) => self.modal.motion = Motion::Thread(word),
             GFunction::Dwell => block.dwell = Some(columns.clone()),
             GFunction::ExactStopOnce => block.motion.exact_stop = true,
             GFunction::Plane(plane) => self.modal.plane = plane,
@@ -322,6 +331,7 @@ impl Interpreter {
             }
             Address::Radius => block.motion.radius = Some((typed, columns.clone())),
             Address::Turn => block.motion.turns = turns(typed, columns)?,
+            Address::StartAngle => block.motion.start_angle = Some((typed, columns.clone())),
             Address::Feed => block.feed = Some((typed, columns.clone())),
             Address::SpindleSpeed => {
                 let speed_rpm = spindle_speed_rpm(typed, columns)?;
@@ -333,11 +343,7 @@ impl Interpreter {
                 block.edge = Some((edge, columns.clone()));
                 block.events.push(Event::Edge(edge));
             }
-            Address::M => {
-                let number = whole(typed, columns, "M")?;
-                self.note_spindle(number);
-                m_function(number, block);
-            }
+            Address::M => self.m_word(whole(typed, columns, "M")?, block),
             Address::RoundingDistance => self.modal.rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?),
             Address::RapidRoundingDistance => {
                 self.modal.rapid_rounding_distance_mm = Some(self.not_negative_mm(typed, columns)?)
@@ -372,6 +378,14 @@ impl Interpreter {
             | Address::MOf(_) => self.feed_address(address, typed, columns, block)?,
         }
         Ok(())
+    }
+
+    fn m_word(&mut self, number: u32, block: &mut Collected) {
+        self.note_spindle(number);
+        m_function(number, block);
+        if number == SPINDLE_POSITION {
+            self.home_spindle(block);
+        }
     }
 
     fn not_negative_mm(&self, typed: Typed, columns: &Columns) -> Outcome<f64> {

@@ -131,6 +131,13 @@ impl FeedModes {
         raised_rpm.min(high_rpm.unwrap_or(f64::INFINITY))
     }
 
+    /// Lowest and highest speed under a constant cutting speed.
+    pub fn cutting_limits_rpm(&self) -> [f64; 2] {
+        let [low_rpm, high_rpm] = self.spindle_limits_rpm;
+        let limit_rpm = self.cutting_limit_rpm.unwrap_or(SPINDLE_SPEED_MAX_RPM).min(SPINDLE_SPEED_MAX_RPM);
+        [low_rpm.unwrap_or(0.0), high_rpm.unwrap_or(f64::INFINITY).min(limit_rpm)]
+    }
+
     /// Speed of the master spindle where the transverse axis is `radius_mm` from the axis of rotation: S = v / (2 pi r), at most LIMS.
     pub fn cutting_rpm(&self, cutting_speed_mm_s: f64, radius_mm: f64) -> f64 {
         let speed_rpm = cutting_speed_mm_s / (RAD_PER_REV * radius_mm.abs()) * S_PER_MIN;

@@ -7,7 +7,7 @@
 //! * CFC, CFTCP and CFIN are kept, and have no effect without tool radius compensation (G41, G42), which is not built.
 //! * OVR acts on F, OVRRAP on rapids, each from more than 0 to 200 %; a rapid is never faster than its axes. 0 would hold the axes for ever.
 //! * ACC of 1 to 200 %, VELOLIM of 1 to 100 %, JERKLIM of 1 to 200 %. For a spindle (S1, SPI(1)) they are put on record.
-//! * Speeds and positions of spindles are put on record, and take no time.
+//! * Speeds and positions of other spindles than the master spindle are put on record, and take no time.
 //!
 //! Positioning axes are in `positioning`, the feed of a motion in `path_feed`.
 
@@ -21,7 +21,7 @@ use super::wire::{Event, ProgrammedLimits};
 use crate::base::units::mm_s_from_m_min;
 use crate::base::{AxisId, AxisKind, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode};
-use crate::program::syntax::{Address, AddressValue, Expr, ExprKind, IndexedValue, Typed};
+use crate::program::syntax::{Address, Expr, ExprKind, IndexedValue, Typed};
 use crate::program::words::{FeedCorrection, FeedShape, FeedType, IndexedAddress, Procedure};
 use crate::program::{Columns, Fault, Outcome, codes};
 
@@ -107,16 +107,16 @@ impl Interpreter {
     fn take_spindle_speed(&mut self, speed: f64, block: &mut Collected) {
         if !self.modal.feed_modes.cutting {
             self.modal.spindle_speed_rpm = speed;
+            let limited_rpm = self.modal.feed_modes.limited_rpm(speed);
+            if limited_rpm != speed {
+                output_speed(block, limited_rpm);
+            }
             return;
         }
         self.modal.feed_modes.cutting_speed_mm_s = Some(mm_s_from_m_min(speed));
         let speed_rpm = self.cutting_rpm_here().unwrap_or(0.0);
         self.modal.spindle_speed_rpm = speed_rpm;
-        for event in &mut block.events {
-            if matches!(event, Event::SpindleSpeed { .. }) {
-                *event = Event::SpindleSpeed { speed_rpm };
-            }
-        }
+        output_speed(block, speed_rpm);
     }
 
     /// M3, M4, M5 and the like.
@@ -150,12 +150,16 @@ impl Interpreter {
             Address::H => block.events.push(Event::HFunction(typed.0)),
             Address::SpindleSpeedOf(spindle) => {
                 let speed_rpm = within(typed.0, [0.0, 1e6], "rpm", columns)?;
-                block.events.push(Event::Spindle(format!("S{spindle}={}", trimmed(speed_rpm)).into()));
+                let named = Event::Spindle(format!("S{spindle}={}", trimmed(speed_rpm)).into());
+                let master = spindle == self.modal.feed_modes.master_spindle;
+                block.events.push(if master { Event::SpindleSpeed { speed_rpm } } else { named });
                 self.other_spindle(spindle, |state| state.0 = speed_rpm);
             }
             Address::MOf(spindle) => {
                 let function = whole(typed, columns, "M")?;
-                block.events.push(Event::Spindle(format!("M{spindle}={function}").into()));
+                let named = Event::Spindle(format!("M{spindle}={function}").into());
+                let master = spindle == self.modal.feed_modes.master_spindle && turns_after(function).is_some();
+                block.events.push(if master { Event::MFunction(function) } else { named });
                 if let Some(turns) = turns_after(function) {
                     self.other_spindle(spindle, |state| state.1 = turns);
                 }
@@ -166,7 +170,7 @@ impl Interpreter {
     }
 
     /// Changes speed and sense of a spindle, the master spindle included.
-    fn other_spindle(&mut self, spindle: u32, change: impl FnOnce(&mut (f64, bool))) {
+    pub(super) fn other_spindle(&mut self, spindle: u32, change: impl FnOnce(&mut (f64, bool))) {
         let modal = &mut self.modal;
         if spindle == modal.feed_modes.master_spindle {
             let mut state = (modal.spindle_speed_rpm, modal.feed_modes.spindle_turns);
@@ -191,12 +195,7 @@ impl Interpreter {
                 .label("expected one value"));
         };
         if matches!(address, IndexedAddress::SpindlePosition | IndexedAddress::SpindlePositionAsync) {
-            if self.first_report(codes::SPINDLE_TIME) {
-                let message = "SPOS is recorded and takes no time: the machine file has no data of the spindle";
-                let fault = Fault::new(codes::SPINDLE_TIME, columns.clone(), message).label("takes no time");
-                self.warn(*fault);
-            }
-            return self.position_spindle(address, index, value, block);
+            return self.position_spindle(address, index, value, columns, block);
         }
         let Some(index) = index else {
             return Err(Fault::new(codes::EXPECTED_VALUE, columns.clone(), "no axis in the brackets")
@@ -257,29 +256,6 @@ impl Interpreter {
         })
     }
 
-    /// SPOS and SPOSA: put on record; the spindle stands afterwards.
-    fn position_spindle(
-        &mut self,
-        address: IndexedAddress,
-        index: Option<&Expr>,
-        value: &AddressValue,
-        block: &mut Collected,
-    ) -> Outcome<()> {
-        let angle_deg = number(&value.value, self)?;
-        let word = word_of(address);
-        let name = match index {
-            Some(index) => format!("[{}]", number(index, self)?),
-            None => String::new(),
-        };
-        block.events.push(Event::Spindle(format!("{word}{name}={}", trimmed(angle_deg)).into()));
-        let spindle = match index {
-            Some(index) => number(index, self)?.max(0.0) as u32,
-            None => self.modal.feed_modes.master_spindle,
-        };
-        self.other_spindle(spindle, |state| state.1 = false);
-        Ok(())
-    }
-
     /// FGROUP, WAITP, WAITS, SOFTA, SPCON, SETMS, POSP.
     pub(super) fn feed_procedure(
         &mut self,
@@ -304,7 +280,11 @@ impl Interpreter {
                     self.modal.feed_modes.positioning_brisk[id] = mode != AccelerationMode::Soft;
                 }
             }
-            Procedure::WaitSpindle | Procedure::SpindleControl => self.record_procedure(procedure, given, block)?,
+            Procedure::WaitSpindle => {
+                self.record_procedure(procedure, given, block)?;
+                block.waits_for_spindle |= self.machine.spindle.is_some();
+            }
+            Procedure::SpindleControl => self.record_procedure(procedure, given, block)?,
             Procedure::MasterSpindle => {
                 let spindle = match given.first().and_then(Option::as_ref) {
                     Some(expr) => whole(Typed(number(expr, self)?), &expr.columns, "SETMS")?,
@@ -357,6 +337,15 @@ impl Interpreter {
     }
 }
 
+/// The speed that the spindle is given in place of the programmed one.
+fn output_speed(block: &mut Collected, speed_rpm: f64) {
+    for event in &mut block.events {
+        if matches!(event, Event::SpindleSpeed { .. }) {
+            *event = Event::SpindleSpeed { speed_rpm };
+        }
+    }
+}
+
 /// Whether a spindle turns after this M function; `None`: as before.
 fn turns_after(m_function: u32) -> Option<bool> {
     let turns = SPINDLE_TURNS.contains(&m_function);
@@ -370,7 +359,7 @@ fn spindle_name(index: &Expr) -> Option<String> {
     digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| name.to_string())
 }
 
-fn word_of(address: IndexedAddress) -> &'static str {
+pub(super) fn word_of(address: IndexedAddress) -> &'static str {
     match address {
         IndexedAddress::Acceleration => "ACC",
         IndexedAddress::Velocity => "VELOLIM",

@@ -5,7 +5,9 @@
 use super::modal::Motion;
 use super::run::Interpreter;
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
-use crate::program::words::{Compressor, CurveWord, ExactStop, FeedShape, FeedType, Measure, Plane, SplineEnd};
+use crate::program::words::{
+    Compressor, CurveWord, ExactStop, FeedShape, FeedType, Measure, Plane, SplineEnd, ThreadWord,
+};
 use crate::program::{Columns, Fault, Outcome, codes};
 
 /// Number of G groups.
@@ -87,6 +89,11 @@ impl Interpreter {
             Motion::Curve(CurveWord::BSpline) => 7,
             Motion::Curve(CurveWord::Cubic) => 8,
             Motion::Curve(CurveWord::Polynomial) => 9,
+            Motion::Thread(ThreadWord::Constant) => 10,
+            Motion::Thread(ThreadWord::Tap) => 11,
+            Motion::Thread(ThreadWord::Retract) => 12,
+            Motion::Thread(ThreadWord::Rising) => 16,
+            Motion::Thread(ThreadWord::Falling) => 17,
             Motion::Curve(CurveWord::Tangential) => 15,
         }
     }

@@ -17,7 +17,8 @@
 //! its parameter and the coefficients of u^0, u^1, ... of the axes that move, `D` for the denominator, its pieces after `|`:
 //! `p2.5 X(0,1,0.2) Y(0,0,1)`.
 //!
-//! A corner that RND, RNDM, CHF or CHR fills adds `RND=5`, `CHF=2` or `CHR=2` before the modes, with FRC or FRCM as `FRC300`.
+//! A thread adds the path in a revolution: `thread=2`, with `SF=90` and `change=0.1` where they are programmed; a tapped one `tap=0.8`, negative
+//! where the spindle turns as with M4. A corner that RND, RNDM, CHF or CHR fills adds `RND=5`, `CHF=2` or `CHR=2` before the modes, with FRC or FRCM as `FRC300`.
 //! A dwell adds `4s`, a function that brings the path to rest adds `stops`. Numbers have at most six decimals and no trailing
 //! zeros. Does not read them back.
 
@@ -25,7 +26,8 @@ use super::listing_curves::curve_text;
 use super::motion::rotary_alone;
 use super::value::trimmed;
 use super::wire::{
-    Compressor, CornerInsert, CornerShape, Event, ExactStop, Feed, Modes, Move, MoveKind, ProgrammedLimits,
+    Compressor, CornerInsert, CornerShape, Event, ExactStop, Feed, Modes, Move, MoveKind, ProgrammedLimits, Thread,
+    ThreadCoupling,
 };
 use crate::base::units::{S_PER_MIN, deg_from_rad, mm_min_from_mm_s, percent_from_ratio};
 use crate::base::{AxisKind, PartPoint};
@@ -214,6 +216,9 @@ fn format_with(machine: &Machine, start: PartPoint, shown: &Move, modes: Option<
     if let Some(curve) = curve_text(machine, &shown.kind) {
         add(&mut text, &curve);
     }
+    if let Some(thread) = &shown.modes.thread {
+        add(&mut text, &thread_text(thread));
+    }
     if let Some(corner) = &shown.corner {
         add(&mut text, &corner_text(corner));
     }
@@ -281,6 +286,21 @@ fn corner_text(corner: &CornerInsert) -> String {
     format!("{word}={}{feed}", trimmed(length_mm))
 }
 
+/// `thread=2 SF=90 change=0.1`, `tap=-0.8`: path in a revolution, its sense.
+fn thread_text(thread: &Thread) -> String {
+    match thread.coupling {
+        ThreadCoupling::Tap { sense_ratio } => format!("tap={}", trimmed(sense_ratio * thread.rise_mm)),
+        ThreadCoupling::Cut { start_angle_rad } => {
+            let start = start_angle_rad.map_or_else(String::new, |rad| format!(" SF={}", trimmed(deg_from_rad(rad))));
+            let change = match thread.rise_change_mm {
+                0.0 => String::new(),
+                change_mm => format!(" change={}", trimmed(change_mm)),
+            };
+            format!("thread={}{start}{change}", trimmed(thread.rise_mm))
+        }
+    }
+}
+
 fn event_text(event: &Event) -> String {
     match event {
         Event::ProgramOpened(opened) => format!("open={:?}", &*opened.name),
@@ -295,6 +315,9 @@ fn event_text(event: &Event) -> String {
         Event::Synchronised(action) => format!("$AC_OVR={}", trimmed(percent_from_ratio(action.override_ratio))),
         Event::CancelSynchronised(ids) => format!("CANCEL{ids:?}"),
         Event::Spindle(text) => text.to_string(),
+        Event::SpindlePosition(positioning) if positioning.text.is_empty() => "spindle=0".to_owned(),
+        Event::SpindlePosition(positioning) => positioning.text.to_string(),
+        Event::SpindleWait => "spindle=wait".to_owned(),
         Event::Programmed(block) => format!("programmed={}", block.motion.word()),
     }
 }

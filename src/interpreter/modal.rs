@@ -5,13 +5,13 @@
 use super::active_frames::ActiveFrames;
 use super::feed_state::FeedModes;
 use super::path_words::ModalCorner;
-use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, ToolOffset};
+use super::wire::{Compressor, ExactStop, Modes, ProgrammedLimits, Thread, ToolOffset};
 use crate::base::AxisKind;
 use crate::base::units::S_PER_MIN;
 use crate::base::units::{mm_from_inch, mm_s_from_mm_min, rad_from_deg};
 use crate::machine::{AccelerationMode, DynamicsMode, FeedSettings, PathMode};
 use crate::program::syntax::Typed;
-use crate::program::words::{CurveWord, Measure, Plane};
+use crate::program::words::{CurveWord, Measure, Plane, ThreadWord};
 use std::sync::Arc;
 
 /// G group 1.
@@ -27,6 +27,8 @@ pub enum Motion {
     CounterClockwise,
     /// CIP, CT, splines, POLY.
     Curve(CurveWord),
+    /// G33 and its kin.
+    Thread(ThreadWord),
 }
 
 /// F word, ready for both kinds of motion.
@@ -73,6 +75,10 @@ pub struct Modal {
     pub tool: Option<Arc<ToolOffset>>,
     /// FFWON or FFWOF.
     pub feedforward_active: bool,
+    /// G33 and its kin: of the block in execution.
+    pub thread: Option<Arc<Thread>>,
+    /// F of G34 and G35, mm a revolution in a revolution; 0 before the first.
+    pub lead_change_mm: f64,
     /// F; `None` before the first.
     pub feed: Option<ProgrammedFeed>,
     /// What else the feed, spindle and positioning words have said.
@@ -103,6 +109,8 @@ impl Modal {
             programmed: None,
             tool: None,
             feedforward_active: true,
+            thread: None,
+            lead_change_mm: 0.0,
             feed: None,
             feed_modes: FeedModes::default(),
             spindle_speed_rpm: 0.0,
@@ -137,6 +145,8 @@ impl Modal {
             programmed: self.programmed.clone(),
             tool: self.tool.clone(),
             feedforward_active: self.feedforward_active,
+            thread: self.thread.clone(),
+            cutting: None,
         }
     }
 

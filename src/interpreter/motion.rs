@@ -60,6 +60,8 @@ pub(super) struct MotionWords {
     pub block_time_s: Option<f64>,
     /// SUPA, G53, G153.
     pub suppression: Option<Suppression>,
+    /// SF.
+    pub start_angle: Option<(Typed, Columns)>,
 }
 
 impl Default for MotionWords {
@@ -72,6 +74,7 @@ impl Default for MotionWords {
             curve: None,
             exact_stop: false,
             suppression: None,
+            start_angle: None,
             block_feed: None,
             block_time_s: None,
         }
@@ -120,7 +123,7 @@ impl Interpreter {
         let words = resolved.as_ref().unwrap_or(words);
         let start = self.position;
         let end = self.end_point(words)?;
-        let circle = matches!(self.modal.motion, Motion::Clockwise | Motion::CounterClockwise);
+        let circle = matches!(self.modal.motion, Motion::Clockwise | Motion::CounterClockwise | Motion::Thread(_));
         if !circle && words.has_circle_words() {
             return Err(Fault::new(codes::BAD_BLOCK, words.columns(), "I, J, K or CR without G2 or G3")
                 .label("only for circles"));
@@ -130,6 +133,7 @@ impl Interpreter {
         let kind = match self.modal.motion {
             Motion::Rapid => MoveKind::Rapid,
             Motion::Line => MoveKind::Line,
+            Motion::Thread(word) => self.thread(word, words, end)?,
             Motion::Clockwise | Motion::CounterClockwise => self.arc(words)?,
             Motion::Curve(CurveWord::ThreePoints) => self.three_points(words)?,
             Motion::Curve(CurveWord::Tangential) => self.tangential(words)?,
@@ -155,6 +159,7 @@ impl Interpreter {
         let straight = matches!(kind, MoveKind::Rapid | MoveKind::Line);
         let last = LastMotion { start, kind: (!straight).then(|| kind.clone()) };
         self.emit(kind, feed, words.exact_stop, events);
+        self.modal.thread = None;
         if !straight || start != end {
             self.last_motion = last;
         }

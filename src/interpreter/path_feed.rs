@@ -18,11 +18,12 @@ use super::feed_state::FeedBase;
 use super::modal::{Motion, ProgrammedFeed};
 use super::motion::{MotionWords, rotary_alone};
 use super::run::Interpreter;
-use super::wire::{Feed, MoveKind, PolynomialGeometry, PolynomialPiece};
-use crate::base::units::S_PER_MIN;
+use super::wire::{CuttingSpeed, Feed, MoveKind, PolynomialGeometry, PolynomialPiece};
+use crate::base::units::{S_PER_MIN, rad_s_from_rpm};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::program::words::FeedShape;
 use crate::program::{Fault, Outcome, codes};
+use std::sync::Arc;
 
 /// Stretches of equal feed in a block whose feed changes.
 pub(super) const STRETCHES: u32 = 32;
@@ -43,6 +44,9 @@ impl Interpreter {
     pub(super) fn feed_of(&mut self, way: Way<'_>, words: &MotionWords) -> Outcome<Feed> {
         if self.modal.motion == Motion::Rapid {
             return Ok(Feed::Rapid);
+        }
+        if let Some(thread) = &self.modal.thread {
+            return Ok(super::thread::thread_feed(thread, self.way_length(way)));
         }
         if let Some(time_s) = words.block_time_s {
             let feed_lu_s = self.way_length(way) / time_s;
@@ -165,6 +169,14 @@ impl Interpreter {
             }
             _ => from + share * (to - from),
         }
+    }
+
+    /// G96 as later rooms need it.
+    pub(super) fn cutting_speed(&self) -> Option<Arc<CuttingSpeed>> {
+        let modes = &self.modal.feed_modes;
+        let (speed_mm_s, axis) = (modes.cutting_speed_mm_s.filter(|_| modes.cutting)?, self.geometry[0]?);
+        let limits_rad_s = modes.cutting_limits_rpm().map(rad_s_from_rpm);
+        Some(CuttingSpeed { speed_mm_s, axis, limits_rad_s }.into())
     }
 
     /// Speed of the spindle where the axes stand, under G96.

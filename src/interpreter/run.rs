@@ -381,7 +381,10 @@ impl Interpreter {
             events.splice(0..0, self.opened.drain(..));
         }
         let block = BlockRef { program: self.program, line: self.current.line, number: self.number };
-        let modes = self.modal.modes(exact_stop);
+        let mut modes = self.modal.modes(exact_stop);
+        if self.modal.feed_modes.cutting {
+            modes.cutting = self.cutting_speed();
+        }
         let corner = match self.modal.corner.radius_mm {
             Some(_) => self.corner_insert(&kind, &CornerWords::default(), None),
             None => None,

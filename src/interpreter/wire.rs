@@ -205,6 +205,69 @@ pub struct Modes {
     pub tool: Option<Arc<ToolOffset>>,
     /// FFWON or FFWOF; starts on, as the machine file's weights say (MD32630 and docs).
     pub feedforward_active: bool,
+    /// G33 and its kin: this block and the master spindle are one motion.
+    pub thread: Option<Arc<Thread>>,
+    /// G96 and its kin: the master spindle follows the distance from its axis.
+    pub cutting: Option<Arc<CuttingSpeed>>,
+}
+
+/// A constant cutting speed: the speed of the spindle is `speed / radius`, within limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CuttingSpeed {
+    /// S under G96.
+    pub speed_mm_s: f64,
+    /// Its distance from 0 in the part is the radius.
+    pub axis: AxisId,
+    /// Lowest and highest speed: G25 S, LIMS and G26 S.
+    pub limits_rad_s: [f64; 2],
+}
+
+impl CuttingSpeed {
+    /// Speed of the spindle at a place, positive.
+    pub fn speed_rad_s(&self, position_mm: f64) -> f64 {
+        let [low_rad_s, high_rad_s] = self.limits_rad_s;
+        (self.speed_mm_s / position_mm.abs()).max(low_rad_s).min(high_rad_s)
+    }
+}
+
+/// How a block and the master spindle move together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thread {
+    /// Which of the two leads.
+    pub coupling: ThreadCoupling,
+    /// Path in one revolution of the spindle, where the block begins; positive.
+    pub rise_mm: f64,
+    /// By how much that grows from one revolution to the next (G34; negative: G35).
+    pub rise_change_mm: f64,
+    /// Programmed speed of the spindle, positive.
+    pub speed_rad_s: f64,
+}
+
+/// Which of axis and spindle leads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ThreadCoupling {
+    /// G33, G34, G35: the path follows the spindle.
+    Cut {
+        /// SF: angle of the spindle at which the block begins; `None`: it goes on from the thread before.
+        start_angle_rad: Option<f64>,
+    },
+    /// G331, G332: the spindle follows the path, from rest to rest.
+    Tap {
+        /// 1: as with M3 while the path goes on; -1: as with M4.
+        sense_ratio: f64,
+    },
+}
+
+impl Thread {
+    /// Path in one revolution of the spindle where `length_mm` of the block are done; not a number where it turns back before that.
+    pub fn rise_at_mm(&self, length_mm: f64) -> f64 {
+        (self.rise_mm * self.rise_mm + 2.0 * self.rise_change_mm * length_mm).sqrt()
+    }
+
+    /// True for G33, G34, G35.
+    pub fn is_cut(&self) -> bool {
+        matches!(self.coupling, ThreadCoupling::Cut { .. })
+    }
 }
 
 /// What the program says about limits and tolerances of single axes, and factors of all.
@@ -280,6 +343,8 @@ impl Modes {
             programmed: None,
             tool: None,
             feedforward_active: true,
+            thread: None,
+            cutting: None,
         }
     }
 }
@@ -410,8 +475,12 @@ pub enum Event {
     Synchronised(Arc<SynchronisedAction>),
     /// CANCEL: the actions of these numbers end.
     CancelSynchronised(Arc<[u32]>),
-    /// S, M of a spindle other than the master spindle, SPOS: as text, such as "S2=500".
+    /// S, M, SPOS of a spindle other than the master spindle: as text, such as "S2=500".
     Spindle(Arc<str>),
+    /// SPOS, SPOSA, M19 of the master spindle.
+    SpindlePosition(Arc<SpindlePositioning>),
+    /// The path rests until the master spindle is at its speed or position.
+    SpindleWait,
     /// What the program asks of the path from here on (smoothing makes it of a motion block, for recordings).
     Programmed(Arc<ProgrammedBlock>),
 }
@@ -459,4 +528,28 @@ impl ProgrammedMotion {
             Self::Positioning => "positioning",
         }
     }
+}
+
+/// Where the master spindle is sent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpindlePositioning {
+    /// Angle, or with `SpindleApproach::By` the way.
+    pub angle_rad: f64,
+    /// Which way round.
+    pub approach: SpindleApproach,
+    /// As programmed, such as "SPOS=90"; empty for M19, which is an event of its own.
+    pub text: Arc<str>,
+}
+
+/// Which way round the spindle goes to its position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpindleApproach {
+    /// As it turns; from rest the shorter way (plain, AC, DC).
+    Onward,
+    /// ACP.
+    Positive,
+    /// ACN.
+    Negative,
+    /// IC: by this way, from where it stands or comes to rest.
+    By,
 }

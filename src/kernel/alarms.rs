@@ -1,17 +1,18 @@
 //! The alarms of a drive: what its signals say, and what a person reads.
 //!
 //! In: the row of an axis at a position tick. Out: the alarm that ends the run, with the number that the control gives it. A `follow`
-//! runs on with a warning: what its drives are given may well be what no control would. Does not stop the axes: a run ends where the alarm stands.
+//! runs on with a warning: what its drives are given may well be what no control would. Does not stop the axes: `braking` does.
 
 use super::cycle::AxisRow;
 use crate::base::{AxisId, AxisKind, Diagnostic, Tick, units};
 use crate::drive::monitoring;
 use crate::machine::Machine;
 
-/// What the control would stop for, if anything: the first of contour, positioning and standstill monitoring.
+/// What the control would stop for, if anything: the first of contour, speed-limit, positioning and standstill monitoring.
 pub(super) fn monitored(machine: &Machine, line: Option<u32>, row: &AxisRow) -> Option<Diagnostic> {
     let AxisRow { tick, axis, signals, .. } = *row;
-    let seen = signals.monitoring & (monitoring::CONTOUR | monitoring::POSITIONING | monitoring::STANDSTILL);
+    let seen = signals.monitoring
+        & (monitoring::CONTOUR | monitoring::POSITIONING | monitoring::STANDSTILL | monitoring::SPEED_LIMIT);
     let drive = machine.axis(axis).drive.as_ref().filter(|_| seen != 0)?;
     let name = &machine.axis(axis).name;
     let line = line.map_or(String::new(), |line| format!(", line {line}"));
@@ -30,6 +31,15 @@ pub(super) fn monitored(machine: &Machine, line: Option<u32>, row: &AxisRow) -> 
              the gains, or give axes.{name}.drive.contour_monitoring_{unit}"
         );
         ("D0004", message, help)
+    } else if seen & monitoring::SPEED_LIMIT != 0 {
+        let (time_s_max, key) = (drive.monitoring.speed_limit_time_s, if unit == "um" { "mm_s" } else { "deg_s" });
+        let message = format!(
+            "axis {name} at {time_s:.4} s{line}: speed set-point at its limit for longer than {time_s_max} s (alarm 25060, MD36210, MD36220)"
+        );
+        let help = format!(
+            "the axis is asked for more than its drive turns: see axes.{name}.drive.speed_setpoint_max_{key} and speed_limit_time_ms"
+        );
+        ("D0008", message, help)
     } else if seen & monitoring::POSITIONING != 0 {
         let (window, within_s) = (shown(drive.in_position_fine_lu), drive.monitoring.positioning_time_s);
         let message = format!(
@@ -51,6 +61,22 @@ pub(super) fn monitored(machine: &Machine, line: Option<u32>, row: &AxisRow) -> 
         ("D0006", message, help)
     };
     Some(Diagnostic::error(code, message).help(help))
+}
+
+/// The alarm of an axis that has left the place where it was clamped.
+pub(super) fn unclamped(machine: &Machine, line: u32, row: &AxisRow, away_lu: f64) -> Diagnostic {
+    let axis = machine.axis(row.axis);
+    let unit = if axis.kind == AxisKind::Linear { "um" } else { "deg" };
+    let allowed = axis.drive.as_ref().map_or(0.0, |drive| drive.monitoring.clamping_lu);
+    let (name, time_s) = (&axis.name, machine.cycle.time_base.time_s(row.tick));
+    let message = format!(
+        "axis {name} at {time_s:.4} s, line {line}: clamping monitoring, {} from where it was clamped, more than {} (alarm 26000, MD36050)",
+        length(axis.kind, away_lu),
+        length(axis.kind, allowed)
+    );
+    let help =
+        format!("release the axis before it moves, or look for what pushes it: see axes.{name}.drive.clamping_{unit}");
+    Diagnostic::error("D0007", message).help(help)
 }
 
 /// The alarm of a drive whose state is no longer finite.

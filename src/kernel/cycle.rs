@@ -5,6 +5,7 @@
 //! record, print or wait: the caller does.
 
 use super::alarms::{diverged, monitored};
+use super::clamping::Clamping;
 use super::contour_error::ContourErrorMeter;
 use super::figures::Figures;
 use super::in_position::InPositionWire;
@@ -12,7 +13,7 @@ use super::inner_rows::InnerRows;
 use super::preparation::{Findings, PieceSource, Preparation};
 use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
-use crate::drive::{AxisSignals, Drive, DriveBatch, DriveInput, IdealDrive, Start};
+use crate::drive::{AxisSignals, Drive, DriveBatch, DriveInput, IdealDrive, SpindleLag, SpindleSignals, Start};
 use crate::feed::{Limit, LimitKind};
 use crate::interpolator::{AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint};
 use crate::interpreter::{ExactStop, Setup};
@@ -56,6 +57,8 @@ pub struct CycleOutput {
     pub tool_setpoint: ToolPose,
     /// Tool in the part frame, by actual positions.
     pub tool_actual: ToolPose,
+    /// The master spindle at the set-point.
+    pub spindle: SpindleSignals,
     /// Distance of the actual tool point from the path of the set-points; `None` where every axis is ideal.
     pub contour_error_mm: Option<f64>,
 }
@@ -116,6 +119,8 @@ pub struct Kernel<S = Preparation> {
     drives: DriveBatch<Drive>,
     step: Step,
     in_position: InPositionWire,
+    clamping: Clamping,
+    spindle: SpindleLag,
     kinematics: Kinematics,
     contour_error: ContourErrorMeter,
     figures: Figures,
@@ -128,7 +133,7 @@ impl Kernel<Preparation> {
     /// At the start of `program`. With `drives` false every axis is ideal. The caller sees to it that [`unsupported`](crate::machine::unsupported)
     /// has nothing against the machine, as [`run`](super::run) does: a value that is not built yet would be passed over.
     pub fn new(machine: Arc<Machine>, program: impl Into<Setup>, drives: bool) -> Self {
-        let source = Preparation::new(program, &machine);
+        let source = Preparation::new(program, &machine).waiting_in_position(drives);
         Self::with_source(machine, source, drives)
     }
 }
@@ -147,6 +152,7 @@ impl<S: PieceSource> Kernel<S> {
             rows: Vec::new(),
             tool_setpoint: tool,
             tool_actual: tool,
+            spindle: SpindleSignals::default(),
             contour_error_mm: None,
         };
         let stages: Vec<Drive> = machine
@@ -175,6 +181,11 @@ impl<S: PieceSource> Kernel<S> {
             drives: DriveBatch::new(stages),
             step: Step { sent: PerAxis::default(), inputs: PerAxis::splat(None), signals: PerAxis::default() },
             in_position,
+            clamping: Clamping::new(&machine),
+            spindle: SpindleLag::new(
+                machine.spindle.filter(|_| drives).map_or(0.0, |spindle| spindle.lag_s),
+                time_base.setpoint_period_s(),
+            ),
             kinematics,
             contour_error: ContourErrorMeter::new(),
             figures: Figures::default(),
@@ -222,9 +233,11 @@ impl<S: PieceSource> Kernel<S> {
         for begun in &self.output.begun {
             self.figures.piece(begun);
         }
+        self.clamping.begin(&self.machine, &self.output.begun);
         if counts {
             self.figures.setpoint(&setpoint);
         }
+        self.output.spindle = self.spindle.step(&setpoint.spindle);
         let stepped = self.step_drives(&setpoint);
         if self.sorts_rows {
             self.output.rows.sort_unstable_by_key(|row| (row.tick, row.axis));
@@ -303,7 +316,9 @@ impl<S: PieceSource> Kernel<S> {
                 if let Some(wait) = &wait {
                     self.in_position.hear(tick, axis, wait, &signals);
                 }
-                if let Some(alarm) = monitored(&self.machine, Some(setpoint.path.block.line), &row) {
+                let line = setpoint.path.block.line;
+                let alarm = monitored(&self.machine, Some(line), &row);
+                if let Some(alarm) = alarm.or_else(|| self.clamping.watch(&self.machine, line, &row)) {
                     return Err(alarm);
                 }
             }
@@ -355,6 +370,26 @@ impl<S: PieceSource> Kernel<S> {
         if self.drives.drives().iter().any(|drive| matches!(drive, Drive::Cascade(_))) {
             self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
         }
+    }
+
+    /// The drives, for [`braking`](super::braking).
+    pub(super) fn drives_mut(&mut self) -> &mut [Drive] {
+        self.drives.drives_mut()
+    }
+
+    /// Ticks between rows.
+    pub(super) fn row_ticks(&self) -> u64 {
+        self.row_ticks
+    }
+
+    /// Ticks of the position cycle of an axis.
+    pub(super) fn position_ticks(&self, axis: AxisId) -> u64 {
+        self.position_cycles[axis.index()].ticks
+    }
+
+    /// Where what a cycle gives is put.
+    pub(super) fn output_mut(&mut self) -> &mut CycleOutput {
+        &mut self.output
     }
 
     /// What the last cycle produced.

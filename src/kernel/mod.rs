@@ -5,6 +5,8 @@
 //! recording around it. Does not print.
 
 mod alarms;
+mod braking;
+mod clamping;
 mod contour_error;
 mod cycle;
 mod figures;
@@ -19,6 +21,7 @@ mod summary;
 mod threads;
 mod what_if;
 
+pub use braking::Braking;
 pub use cycle::{AxisRow, CycleOutput, Kernel, Status};
 pub use figures::Figures;
 pub use follow::{FollowOptions, FollowOutcome, follow};
@@ -26,5 +29,5 @@ pub use in_position::InPosition;
 pub use preparation::{Findings, PieceSource, Preparation};
 pub use run::{Deadlines, Progress, RunError, RunOptions, RunOutcome, run};
 pub use setpoint_table::{SetpointTable, row_period_s};
-pub use summary::{CornerSummary, OverrideSummary, RunSummary, Warning};
+pub use summary::{CornerSummary, OverrideSummary, RunSummary, Warning, drive_warnings};
 pub use what_if::{Saving, WhatIf, what_if};

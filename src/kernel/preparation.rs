@@ -48,9 +48,11 @@ pub struct Preparation {
     alarm: Option<Diagnostic>,
     finished: bool,
     time_base: TimeBase,
+    /// An axis of the machine has a drive.
+    machine_drives: bool,
     /// The interpreter waits for the time at which the path rests.
     stopped: bool,
-    /// Time of all waits for the axes.
+    /// Time of all waits for the axes, as told.
     waited_s: f64,
     /// What the interpreter made of the program since the last call of `take_moves`; `None`: not kept.
     moves: Option<Vec<Move>>,
@@ -68,6 +70,7 @@ impl Preparation {
             alarm: None,
             finished: false,
             time_base: machine.cycle.time_base,
+            machine_drives: machine.axes.iter().any(|axis| axis.drive.is_some()),
             stopped: false,
             waited_s: 0.0,
             moves: None,
@@ -77,6 +80,12 @@ impl Preparation {
     /// With changes of the feed override at run time.
     pub fn with_overrides(self, schedule: &OverrideSchedule) -> Self {
         Self { planner: self.planner.with_overrides(schedule), ..self }
+    }
+
+    /// With drives: block ends wait for the axes, and [`PieceSource::waited`] tells how long.
+    pub fn waiting_in_position(self, drives: bool) -> Self {
+        let driven = drives && self.machine_drives;
+        Self { planner: self.planner.waiting_in_position(driven), ..self }
     }
 
     /// With an `Event::Programmed` for every motion block: what the program asks of the path, for a recording.
@@ -131,11 +140,11 @@ impl Preparation {
     }
 
     /// Where the path rests that has been handed out: at the first set-point at or after its end. Counted from planned durations and
-    /// from the waits that the cycle has told, so that it does not depend on how far the cycle is.
+    /// from the waits that the cycle has told, which the planner adds, so that it does not depend on how far the cycle is.
     fn main_run(&self) -> MainRun {
         let (elapsed_s, cutting_time_s) = self.planner.elapsed_s();
         let period_s = self.time_base.setpoint_period_s();
-        let k = ((elapsed_s + self.waited_s) / period_s * (1.0 - SAME_TIME_RATIO)).ceil().max(0.0) as u64;
+        let k = (elapsed_s / period_s * (1.0 - SAME_TIME_RATIO)).ceil().max(0.0) as u64;
         MainRun { time_s: self.time_base.time_s(self.time_base.setpoint_tick(k)), cutting_time_s }
     }
 
@@ -144,7 +153,7 @@ impl Preparation {
         std::mem::take(&mut self.warnings)
     }
 
-    /// The next piece; `None` at the end, and where the interpreter waits for the time at which the path rests.
+    /// The next piece; `None` at the end, and where preparation waits to be told how long block ends have waited ([`Preparation::stopped`]).
     pub(super) fn piece_ahead(&mut self) -> Option<PlannedPiece> {
         loop {
             if let Some(piece) = self.planner.pop() {
@@ -155,8 +164,11 @@ impl Preparation {
                 }
                 return Some(piece);
             }
+            if self.planner.awaits() {
+                return None;
+            }
             if self.finished {
-                if let Some((block, warning)) = self.planner.take_warning() {
+                while let Some((block, warning)) = self.planner.take_warning() {
                     self.warnings.push(self.smoother.marked(warning, block));
                 }
                 return None;
@@ -168,13 +180,16 @@ impl Preparation {
         }
     }
 
-    /// The interpreter waits for the time at which the path rests: all pieces up to there have been handed out.
+    /// Preparation waits to be told how long block ends have waited: all pieces up to there have been handed out.
     pub(super) fn stopped(&self) -> bool {
-        self.stopped && !self.finished
+        self.planner.awaits() || (self.stopped && !self.finished)
     }
 
-    /// Tells the interpreter that time. What has been waited by now must be known.
+    /// Goes on. What has been waited by now must be known.
     pub(super) fn go_on(&mut self) {
+        if self.planner.awaits() {
+            return self.planner.tell_waited(self.waited_s);
+        }
         self.stopped = false;
         self.interpreter.tell_main_run(self.main_run());
     }

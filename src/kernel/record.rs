@@ -44,6 +44,9 @@ pub(super) fn record_cycle(recorder: &mut Recorder, machine: &Machine, output: &
         }
     }
     recorder.path(tick, &setpoint.path, output.contour_error_mm);
+    if machine.spindle.is_some() {
+        recorder.spindle(tick, &output.spindle);
+    }
     let cycle_ticks = machine.cycle.time_base.ticks_per_setpoint();
     record_poses(recorder, &machine.cycle.time_base, tick, cycle_ticks, [output.tool_setpoint, output.tool_actual]);
     record_rows(recorder, &output.rows);
@@ -59,6 +62,12 @@ pub(super) fn record_follow(
 ) -> Result<(), Diagnostic> {
     record_poses(recorder, time_base, row.tick, row_ticks, row.tools);
     record_rows(recorder, row.rows);
+    recorder.check()
+}
+
+/// Records how the axes brake after an alarm.
+pub(super) fn record_braking(recorder: &mut Recorder, output: &CycleOutput) -> Result<(), Diagnostic> {
+    record_rows(recorder, &output.rows);
     recorder.check()
 }
 

@@ -5,10 +5,10 @@
 
 use super::cycle::{Kernel, Status};
 use super::preparation::{PieceSource, Preparation};
-use super::record::{record_alarm, record_cycle};
+use super::record::{record_alarm, record_braking, record_cycle};
 use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
-use crate::base::Diagnostic;
+use crate::base::{Diagnostic, Tick};
 use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
 use crate::machine::{Loaded, Machine, TimeLawKind, unsupported};
@@ -89,7 +89,9 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
     if !options.overrides.changes().is_empty() && machine.feed.time_law == TimeLawKind::SevenPhase {
         return Err(RunError(override_refused()));
     }
-    let preparation = Preparation::new(options.setup.clone(), &machine).with_overrides(&options.overrides);
+    let preparation = Preparation::new(options.setup.clone(), &machine)
+        .with_overrides(&options.overrides)
+        .waiting_in_position(options.drives);
     let preparation = if options.recording.is_some() { preparation.telling_programmed() } else { preparation };
     if options.threads > 1 {
         let source = PreparationThread::spawn(preparation)
@@ -140,7 +142,28 @@ fn drive_loop<S: PieceSource>(
             });
         }
     }
+    if let (Some(alarm), Some(recorder)) = (&drive_alarm, &mut recorder) {
+        record_stop(&mut kernel, alarm, recorder)?;
+    }
     conclude(kernel, &options, drive_alarm, recorder, pacer.map(|pacer| pacer.deadlines))
+}
+
+/// The alarm of a drive, and how the axes brake after it.
+fn record_stop<S: PieceSource>(
+    kernel: &mut Kernel<S>,
+    alarm: &Diagnostic,
+    recorder: &mut Recorder,
+) -> Result<(), RunError> {
+    let tick = kernel.output().rows.last().map_or(Tick(0), |row| row.tick);
+    record_alarm(recorder, tick, alarm);
+    let Some(mut braking) = kernel.brake() else { return Ok(()) };
+    loop {
+        let goes_on = kernel.brake_on(&mut braking);
+        record_braking(recorder, kernel.output()).map_err(RunError)?;
+        if !goes_on {
+            return Ok(());
+        }
+    }
 }
 
 /// Progress is offered at every multiple of this many ticks; the receiver decides how often it draws.
@@ -179,13 +202,7 @@ fn conclude<S: PieceSource>(
                        which are left out here; `sollwert run` waits";
         warnings.push(Diagnostic::warning("K0002", message));
     }
-    if kernel.waited_s() > 0.0 && !options.overrides.changes().is_empty() {
-        let message = format!(
-            "the times of --override are those of the path: {:.3} s in which exact stops wait for the axes are not counted in them",
-            kernel.waited_s()
-        );
-        warnings.push(Diagnostic::warning("K0009", message));
-    }
+    let alarm_recorded = drive_alarm.is_some();
     let alarm = drive_alarm.or(findings.alarm);
     if let Some(alarm) = &alarm {
         tracing::error!(code = alarm.code, line = alarm.line(), message = %alarm.message, "alarm");
@@ -199,7 +216,7 @@ fn conclude<S: PieceSource>(
     let recording = match recorder {
         None => None,
         Some(mut recorder) => {
-            if let Some(alarm) = &alarm {
+            if let Some(alarm) = alarm.as_ref().filter(|_| !alarm_recorded) {
                 let setpoint = machine.cycle.time_base.setpoint_tick(kernel.figures().setpoints);
                 let tick = kernel.output().rows.last().map_or(setpoint, |row| row.tick.max(setpoint));
                 record_alarm(&mut recorder, tick, alarm);

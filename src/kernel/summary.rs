@@ -170,7 +170,7 @@ pub(super) fn limit_name(machine: &Machine, limit: Limit) -> String {
 }
 
 /// One warning for all axes whose drives are representative, one for all that are ideal.
-pub(super) fn drive_warnings(machine: &Machine, drives: bool) -> Vec<Diagnostic> {
+pub fn drive_warnings(machine: &Machine, drives: bool) -> Vec<Diagnostic> {
     let mut warnings = Vec::new();
     if !drives {
         return warnings;

@@ -12,8 +12,8 @@ use super::choices::{Carries, KinematicsType, words};
 use super::drive_catalogue::DRIVE;
 use super::keys::{Absent, Accepts, Key, Range, TableKeys};
 use super::mechanics_catalogue::{ENCODER, MECHANICS, MOTOR};
-use Absent::{Means, Number as Value, Required, Word};
-use Accepts::{Choice, Joints, Number, Text, Vector, Whole};
+use Absent::{Means, No, Number as Value, Required, Word};
+use Accepts::{Choice, Flag, Joints, Number, Text, Vector, Whole};
 
 /// The version of the file format that this version of the program reads.
 pub(super) const FORMAT: u32 = 1;
@@ -259,6 +259,30 @@ const SPINDLE: &[Key] = &[
         "a feed waits until the speed is this near, as a share of it",
     )
     .md("MD35150, MD35500"),
+    Key::new("feed_waits_for_stop", "", Flag, No, "a feed behind M5 waits until the spindle stands").md("MD35510"),
+    Key::new(
+        "positioning_speed_rpm",
+        "rpm",
+        Number(Range::Between(0.1, 1e5)),
+        Value(500.0),
+        "speed of SPOS and M19, and at which a spindle that turns goes over to them",
+    )
+    .md("MD35300"),
+    Key::new(
+        "positioning_acceleration_rot_s2",
+        "rot/s²",
+        Number(Range::Between(0.1, 1e5)),
+        Means("as acceleration_rot_s2"),
+        "acceleration of the master spindle in position control: SPOS, M19, G331, G332",
+    )
+    .md("MD35210, MD35212"),
+    Key::new(
+        "lag_ms",
+        "ms",
+        Number(Range::NotNegative),
+        Value(0.0),
+        "delay of first order from the set-point of the speed to the actual one",
+    ),
 ];
 
 const KINEMATICS: &[Key] = &[

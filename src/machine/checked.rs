@@ -37,6 +37,14 @@ pub struct SpindleSettings {
     pub acceleration_rad_s2: f64,
     /// A feed waits until the speed is this near; 0: it does not wait.
     pub tolerance_share: f64,
+    /// A feed behind M5 waits as well.
+    pub waits_for_stop: bool,
+    /// Speed of positioning, and at which a spindle that turns goes over to it.
+    pub positioning_speed_rad_s: f64,
+    /// Acceleration of positioning and of tapping.
+    pub positioning_acceleration_rad_s2: f64,
+    /// Delay of first order from the set-point of the speed to the actual one; 0: none.
+    pub lag_s: f64,
 }
 
 impl Machine {
@@ -470,6 +478,14 @@ pub struct MonitoringData {
     pub standstill_delay_s: f64,
     /// MD36400.
     pub contour_lu: f64,
+    /// MD36220: how long the speed set-point may be at its limit.
+    pub speed_limit_time_s: f64,
+    /// MD36050.
+    pub clamping_lu: f64,
+    /// M functions that clamp and release the axis.
+    pub clamp_m_functions: Option<[u32; 2]>,
+    /// MD36610: time in which an alarm brings the axis to rest.
+    pub stop_time_s: f64,
 }
 
 /// `[axes.*.motor]`.

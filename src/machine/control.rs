@@ -8,7 +8,7 @@ use super::choices::{Carries, Choice, KinematicsType};
 use super::document::Node;
 use super::section::Section;
 use crate::base::diagnostics::{Diagnostic, nearest};
-use crate::base::units::{rad_from_deg, rad_from_rot};
+use crate::base::units::{rad_from_deg, rad_from_rot, rad_s_from_rpm, s_from_ms};
 use crate::base::{AxisId, AxisKind};
 
 /// Rotary axes that a kinematic chain may have.
@@ -56,8 +56,20 @@ pub(super) fn smoothing(root: &Section<'_>) -> SmoothingSettings {
 pub(super) fn spindle(root: &Section<'_>) -> Option<SpindleSettings> {
     let spindle = root.table("spindle", "spindle");
     let tolerance_share = spindle.number("speed_tolerance");
-    let acceleration_rot_s2 = spindle.optional_number("acceleration_rot_s2")?;
-    Some(SpindleSettings { acceleration_rad_s2: rad_from_rot(acceleration_rot_s2), tolerance_share })
+    let acceleration_rot_s2 = spindle.optional_number("acceleration_rot_s2");
+    let positioning_rot_s2 = spindle.optional_number("positioning_acceleration_rot_s2");
+    let waits_for_stop = spindle.flag("feed_waits_for_stop");
+    let [positioning_speed_rpm, lag_ms] = ["positioning_speed_rpm", "lag_ms"].map(|key| spindle.number(key));
+    let acceleration_rot_s2 = acceleration_rot_s2?;
+    let positioning_rot_s2 = positioning_rot_s2.unwrap_or(acceleration_rot_s2);
+    Some(SpindleSettings {
+        acceleration_rad_s2: rad_from_rot(acceleration_rot_s2),
+        tolerance_share,
+        waits_for_stop,
+        positioning_speed_rad_s: rad_s_from_rpm(positioning_speed_rpm),
+        positioning_acceleration_rad_s2: rad_from_rot(positioning_rot_s2),
+        lag_s: s_from_ms(lag_ms),
+    })
 }
 
 pub(super) fn kinematics(root: &Section<'_>, axes: &[Axis]) -> KinematicsSettings {

@@ -63,6 +63,10 @@ fn controllers<'f>(axis: &Section<'f>) -> (DriveData, LoopCycles<'f>) {
             standstill_lu: small_lu(&drive, "standstill_um", "standstill_deg"),
             standstill_delay_s: s_from_ms(drive.number("standstill_delay_ms")),
             contour_lu: small_lu(&drive, "contour_monitoring_um", "contour_monitoring_deg"),
+            speed_limit_time_s: drive.optional_number("speed_limit_time_ms").map_or(f64::INFINITY, s_from_ms),
+            clamping_lu: small_lu(&drive, "clamping_um", "clamping_deg"),
+            clamp_m_functions: clamp_m_functions(&drive),
+            stop_time_s: s_from_ms(drive.number("emergency_stop_time_ms")),
         },
         // Ticks are known when all axes have been read: `clock` fills them in.
         position_cycle_ticks: 0,
@@ -102,6 +106,22 @@ fn controllers<'f>(axis: &Section<'f>) -> (DriveData, LoopCycles<'f>) {
         drive,
     };
     (data, cycles)
+}
+
+/// One of them without the other is an error.
+fn clamp_m_functions(drive: &Section<'_>) -> Option<[u32; 2]> {
+    let keys = ["clamp_m_function", "release_m_function"];
+    let functions = keys.map(|key| drive.whole(key));
+    let [clamps, releases] = keys.map(|key| drive.has(key));
+    let same = functions[0].is_some() && functions[0] == functions[1];
+    if clamps != releases || same {
+        let key = if clamps { keys[0] } else { keys[1] };
+        let message =
+            format!("{} needs clamp_m_function and release_m_function, two different M functions", drive.full(key));
+        drive.report_at(key, "", Diagnostic::error("M0008", message).help("such as 10 to clamp and 11 to release"));
+    }
+    let [Some(clamp), Some(release)] = functions else { return None };
+    Some([clamp, release])
 }
 
 /// A drive that cannot reach the velocity of its axis never follows a rapid: worth a word.

@@ -6,7 +6,7 @@ use super::choices::words;
 use super::drive_options::{Balancing, FilterShape, JerkFilterKind};
 use super::keys::{Absent, Accepts, Key, Range};
 use Absent::{Means, No, Number as Value, Required, Word};
-use Accepts::{Choice, Flag, Number};
+use Accepts::{Choice, Flag, Number, Whole};
 
 const POSITIVE: Accepts = Number(Range::Positive);
 /// Delays in ms: a second is far beyond any control, and a delay line takes memory for every cycle of it.
@@ -78,6 +78,30 @@ pub(super) const DRIVE: &[Key] = &[
     )
     .rotary("contour_monitoring_um")
     .md("MD36400"),
+    Key::new(
+        "speed_limit_time_ms",
+        "ms",
+        NOT_NEGATIVE,
+        Means("not monitored"),
+        "how long the speed set-point may be at speed_setpoint_max",
+    )
+    .md("MD36220"),
+    Key::new("clamping_um", "µm", OR_INFINITE, Value(500.0), "deviation allowed while the axis is clamped; inf = not monitored")
+        .linear("clamping_deg")
+        .md("MD36050"),
+    Key::new("clamping_deg", "deg", OR_INFINITE, Value(0.5), "deviation allowed while the axis is clamped; inf = not monitored")
+        .rotary("clamping_um")
+        .md("MD36050"),
+    Key::new("clamp_m_function", "", Whole(0, 99_999_999), Means("never clamped"), "M function that clamps the axis"),
+    Key::new("release_m_function", "", Whole(0, 99_999_999), Means("never clamped"), "M function that releases it"),
+    Key::new(
+        "emergency_stop_time_ms",
+        "ms",
+        FILTER_TIME,
+        Value(50.0),
+        "time in which an alarm brings the speed set-point to 0",
+    )
+    .md("MD36610"),
     Key::new("position_cycle_ms", "ms", POSITIVE, Required, "[T_p] t_s is a whole multiple of it").md("MD10061"),
     Key::new("speed_cycle_us", "µs", LOOP_CYCLE, Required, "[T_v] the position cycle is a whole multiple of it")
         .md("p0115[1], MD1001"),
@@ -158,10 +182,10 @@ pub(super) const DRIVE: &[Key] = &[
     Key::new("stiffness_control", "", Flag, No, "DSC: the position controller works in the speed cycle").md("MD32640"),
     Key::new("jerk_filter", "", Choice(words::<JerkFilterKind>), Word("off"), "filter of the position set-point")
         .md("MD32400, MD32402"),
-    Key::new("jerk_filter_time_ms", "ms", FILTER_TIME, Value(1.0), "time of an average, delay of the second order")
+    Key::new("jerk_filter_time_ms", "ms", FILTER_TIME, Value(1.0), "time of an average, delay of the second order, length of the FIR low-pass")
         .md("MD32410"),
     Key::new("jerk_filter_time_add_ms", "ms", FILTER_TIME, Value(1.0), "time of the second average").md("MD32411"),
-    Key::new("jerk_filter_frequency_hz", "Hz", POSITIVE, Value(10.0), "frequency of the band-stop").md("MD32412"),
+    Key::new("jerk_filter_frequency_hz", "Hz", POSITIVE, Value(10.0), "frequency of the band-stop, cut-off of the FIR low-pass").md("MD32412"),
     Key::new(
         "jerk_filter_damping",
         "",
@@ -229,6 +253,38 @@ pub(super) const DRIVE: &[Key] = &[
         "time constant with which the pulse fades",
     )
     .md("MD32540"),
+    Key::new(
+        "friction_adaptation",
+        "",
+        Flag,
+        No,
+        "the pulse depends on the acceleration: up with it to the first, full to the second, down to the third, lowest above",
+    )
+    .md("MD32510"),
+    Key::new("friction_compensation_min_mm_s", "mm/s", ANY, Value(0.0), "pulse above the third acceleration")
+        .linear("friction_compensation_min_deg_s")
+        .md("MD32530"),
+    Key::new("friction_compensation_min_deg_s", "deg/s", ANY, Value(0.0), "pulse above the third acceleration")
+        .rotary("friction_compensation_min_mm_s")
+        .md("MD32530"),
+    Key::new("friction_acceleration_1_m_s2", "m/s²", POSITIVE, Value(0.02), "first acceleration of the adaptation")
+        .linear("friction_acceleration_1_rot_s2")
+        .md("MD32550"),
+    Key::new("friction_acceleration_2_m_s2", "m/s²", POSITIVE, Value(0.05), "second acceleration of the adaptation")
+        .linear("friction_acceleration_2_rot_s2")
+        .md("MD32560"),
+    Key::new("friction_acceleration_3_m_s2", "m/s²", POSITIVE, Value(0.1), "third acceleration of the adaptation")
+        .linear("friction_acceleration_3_rot_s2")
+        .md("MD32570"),
+    Key::new("friction_acceleration_1_rot_s2", "rot/s²", POSITIVE, Value(0.02), "first acceleration of the adaptation")
+        .rotary("friction_acceleration_1_m_s2")
+        .md("MD32550"),
+    Key::new("friction_acceleration_2_rot_s2", "rot/s²", POSITIVE, Value(0.05), "second acceleration of the adaptation")
+        .rotary("friction_acceleration_2_m_s2")
+        .md("MD32560"),
+    Key::new("friction_acceleration_3_rot_s2", "rot/s²", POSITIVE, Value(0.1), "third acceleration of the adaptation")
+        .rotary("friction_acceleration_3_m_s2")
+        .md("MD32570"),
     Key::new(
         "backlash_compensation_um",
         "µm",

@@ -9,7 +9,7 @@ use super::mechanics::by_motor;
 use super::section::Section;
 use crate::base::AxisKind;
 use crate::base::diagnostics::Diagnostic;
-use crate::base::units::{RAD_PER_REV, mm_from_um, s_from_ms};
+use crate::base::units::{RAD_PER_REV, mm_from_m, mm_from_um, rad_from_rot, s_from_ms};
 
 /// Filters of the current set-point (p1656 has four).
 pub const CURRENT_FILTERS: usize = 4;
@@ -76,6 +76,8 @@ pub enum JerkFilterKind {
     BandStop,
     /// 4.
     DoubleMovingAverage,
+    /// 5.
+    FirLowPass,
 }
 
 impl Choice for JerkFilterKind {
@@ -85,6 +87,7 @@ impl Choice for JerkFilterKind {
         ("moving_average", Self::MovingAverage),
         ("band_stop", Self::BandStop),
         ("double_moving_average", Self::DoubleMovingAverage),
+        ("fir_low_pass", Self::FirLowPass),
     ];
 }
 
@@ -136,6 +139,15 @@ impl Choice for PositionSource {
     const WORDS: &'static [(&'static str, Self)] = &[("load", Self::Load), ("motor", Self::Motor)];
 }
 
+/// How the pulse at a reversal depends on the acceleration there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionAdaptation {
+    /// MD32530.
+    pub lowest_lu_s: f64,
+    /// MD32550, MD32560, MD32570: not falling.
+    pub accelerations_lu_s2: [f64; 3],
+}
+
 /// All of it; the default is everything off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveOptions {
@@ -157,6 +169,8 @@ pub struct DriveOptions {
     pub torque_lower_n_m: f64,
     /// MD32520; 0 = off.
     pub friction_pulse_lu_s: f64,
+    /// MD32510; `None`: the pulse is always the same.
+    pub friction_adaptation: Option<FrictionAdaptation>,
     /// MD32540.
     pub friction_pulse_time_s: f64,
     /// MD32450; 0 = off.
@@ -175,6 +189,7 @@ impl Default for DriveOptions {
             torque_upper_n_m: f64::INFINITY,
             torque_lower_n_m: f64::NEG_INFINITY,
             friction_pulse_lu_s: 0.0,
+            friction_adaptation: None,
             friction_pulse_time_s: 1.0,
             backlash_compensation_lu: 0.0,
         }
@@ -226,6 +241,7 @@ pub(super) fn options(drive: &Section<'_>, position_cycle_s: f64, speed_cycle_s:
         torque_upper_n_m: drive.optional_number(upper).unwrap_or(f64::INFINITY),
         torque_lower_n_m: drive.optional_number(lower).unwrap_or(f64::NEG_INFINITY),
         friction_pulse_lu_s: lu(kind, drive.number(pulse)),
+        friction_adaptation: friction_adaptation(drive, kind),
         friction_pulse_time_s: s_from_ms(drive.number("friction_compensation_time_ms")),
         backlash_compensation_lu: small_lu(drive, "backlash_compensation_um", "backlash_compensation_deg"),
     }
@@ -237,6 +253,32 @@ pub(super) fn small_lu(section: &Section<'_>, linear_um: &'static str, rotary_de
         AxisKind::Linear => mm_from_um(section.number(linear_um)),
         AxisKind::Rotary => lu(AxisKind::Rotary, section.number(rotary_deg)),
     }
+}
+
+fn friction_adaptation(drive: &Section<'_>, kind: AxisKind) -> Option<FrictionAdaptation> {
+    let lowest = by_kind(kind, "friction_compensation_min_mm_s", "friction_compensation_min_deg_s");
+    let accelerations_lu_s2 = match kind {
+        AxisKind::Linear => {
+            ["friction_acceleration_1_m_s2", "friction_acceleration_2_m_s2", "friction_acceleration_3_m_s2"]
+                .map(|key| mm_from_m(drive.number(key)))
+        }
+        AxisKind::Rotary => {
+            ["friction_acceleration_1_rot_s2", "friction_acceleration_2_rot_s2", "friction_acceleration_3_rot_s2"]
+                .map(|key| rad_from_rot(drive.number(key)))
+        }
+    };
+    let adaptation = FrictionAdaptation { lowest_lu_s: lu(kind, drive.number(lowest)), accelerations_lu_s2 };
+    if !drive.flag("friction_adaptation") {
+        return None;
+    }
+    let [first, second, third] = accelerations_lu_s2;
+    if first > second || second > third {
+        let message =
+            format!("{}: the three accelerations of the adaptation must not fall", drive.full("friction_adaptation"));
+        let help = "give friction_acceleration_1, _2 and _3 in rising order";
+        drive.report_at("friction_adaptation", "", Diagnostic::error("M0008", message).help(help));
+    }
+    Some(adaptation)
 }
 
 fn jerk_filter(drive: &Section<'_>, position_cycle_s: f64) -> JerkFilter {
@@ -251,7 +293,7 @@ fn jerk_filter(drive: &Section<'_>, position_cycle_s: f64) -> JerkFilter {
         JerkFilterKind::SecondOrder => {
             below_half_rate(drive, "jerk_filter_time_ms", filter.low_pass().frequency_hz, position_cycle_s);
         }
-        JerkFilterKind::BandStop => {
+        JerkFilterKind::BandStop | JerkFilterKind::FirLowPass => {
             below_half_rate(drive, "jerk_filter_frequency_hz", filter.frequency_hz, position_cycle_s);
         }
         _ => {}

@@ -97,7 +97,7 @@ pub fn parse(source: &SourceText, sets: &[String]) -> Result<Loaded, Vec<Diagnos
     }
     let applied = apply_sets(&mut root, sets, &texts)?;
     let (machine, findings) = check(&root, &texts);
-    let (Some(machine), Some(text_as_used)) = (machine, overrides::text_with(text, &applied)) else {
+    let (Some(machine), Some(text_as_used)) = (machine, overrides::text_with(text, &applied, overrides::SET)) else {
         return Err(findings);
     };
     let name = source.name.rsplit(['/', '\\']).next().unwrap_or(&source.name);

@@ -18,6 +18,7 @@ mod drive_options;
 mod error_table;
 mod keys;
 mod later;
+mod listing;
 mod load;
 mod mechanics;
 mod mechanics_catalogue;
@@ -33,12 +34,18 @@ pub use catalogue::tables;
 pub use checked::*;
 pub use choices::Choice;
 pub use drive_options::{
-    Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, JerkFilter, JerkFilterKind, PositionSource,
+    Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, FrictionAdaptation, JerkFilter, JerkFilterKind,
+    PositionSource,
 };
 pub use error_table::ErrorTable;
 pub use keys::{Absent, Accepts, Key, MotorKind, Range, TableKeys};
 pub use later::unsupported;
+pub use listing::{
+    AxisChoice, ImportOptions, Imported, ListingFile, Origin, Sourced, Unknown, export_feedforward, export_listing,
+    import_listing,
+};
 pub use load::{LoadError, Loaded, load, parse};
+pub use overrides::edited;
 pub use schema::schema;
 pub use shipped::{DEFAULT_MACHINE, shipped};
 pub use tools::{EDGE_MAX, Tool, ToolEdge, ToolTable, Workshop, ZeroOffset};

@@ -128,35 +128,52 @@ fn unknown_axis(root: &Node, path: &[String]) -> Option<(String, String)> {
 
 /// The file with the values set: a comment beside a replaced value is kept, with a word that the value is no longer the file's.
 /// `None` if the text cannot hold them (it was checked before, so it can).
-pub(super) fn text_with(text: &str, sets: &[Override]) -> Option<String> {
+pub(super) fn text_with(text: &str, sets: &[Override], by: &str) -> Option<String> {
     if sets.is_empty() {
         return Some(text.to_owned());
     }
     let mut document: DocumentMut = text.parse().ok()?;
     for set in sets {
         let (last, parents) = set.path.split_last()?;
-        write(document.as_table_mut(), false, parents, last, &set.written)?;
+        write(document.as_table_mut(), Line { inline: false, by }, parents, last, &set.written)?;
     }
     Some(document.to_string())
 }
 
-/// `inline`: the table stands in braces on one line, where no comment can stand.
+/// A machine file with values replaced, comments and order kept; `by` stands in front of the comment beside each. `sets` are those of `--set`.
+pub fn edited(text: &str, sets: &[String], by: &str) -> Result<String, Vec<Diagnostic>> {
+    let mut read = Vec::new();
+    for (place, argument) in sets.iter().enumerate() {
+        read.push(parse(argument, place + 1).map_err(|finding| vec![*finding])?);
+    }
+    let no_text = || vec![Diagnostic::error("M0002", "the machine file does not take these values")];
+    text_with(text, &read, by).ok_or_else(no_text)
+}
+
+/// Where a value is written, and who writes it.
+#[derive(Clone, Copy)]
+struct Line<'b> {
+    /// The table stands in braces on one line, where no comment can stand.
+    inline: bool,
+    by: &'b str,
+}
+
 fn write(
     table: &mut dyn TableLike,
-    inline: bool,
+    line: Line<'_>,
     parents: &[String],
     key: &str,
     value: &toml_edit::Value,
 ) -> Option<()> {
     if let Some((parent, deeper)) = parents.split_first() {
         if table.get(parent).is_none() {
-            table.insert(parent, new_table(inline, table.is_dotted()));
+            table.insert(parent, new_table(line.inline, table.is_dotted()));
         }
         let item = table.get_mut(parent)?;
-        let inline = item.is_inline_table();
-        return write(item.as_table_like_mut()?, inline, deeper, key, value);
+        let line = Line { inline: item.is_inline_table(), ..line };
+        return write(item.as_table_like_mut()?, line, deeper, key, value);
     }
-    let in_lines = !inline;
+    let in_lines = !line.inline;
     let mut value = value.clone();
     match table.get(key).and_then(Item::as_value) {
         Some(old) => {
@@ -164,10 +181,10 @@ fn write(
             let prefix = old.decor().prefix().and_then(|raw| raw.as_str()).unwrap_or(" ").to_owned();
             let mut bare = old.clone();
             bare.decor_mut().clear();
-            let suffix = if in_lines { comment(Some(bare.to_string()), &suffix) } else { suffix };
+            let suffix = if in_lines { comment(line.by, Some(bare.to_string()), &suffix) } else { suffix };
             *value.decor_mut() = toml_edit::Decor::new(prefix, suffix);
         }
-        None if in_lines => *value.decor_mut() = toml_edit::Decor::new(" ", comment(None, "")),
+        None if in_lines => *value.decor_mut() = toml_edit::Decor::new(" ", comment(line.by, None, "")),
         None => {}
     }
     // In place: an insert would take the comments before the key along.
@@ -181,14 +198,14 @@ fn write(
 }
 
 /// `  # --set, was 20.0; published, [Essid 2019, Table 2]`
-fn comment(old_value: Option<String>, old_suffix: &str) -> String {
+fn comment(by: &str, old_value: Option<String>, old_suffix: &str) -> String {
     let was = match old_value {
         Some(old) if !old.contains(['\n', '\r']) => format!(", was {}", old.trim()),
         _ => String::new(),
     };
     let kept = old_suffix.trim().trim_start_matches('#').trim_start();
     let separator = if kept.is_empty() { "" } else { "; " };
-    format!("  # {SET}{was}{separator}{kept}")
+    format!("  # {by}{was}{separator}{kept}")
 }
 
 fn new_table(inline: bool, dotted: bool) -> Item {

@@ -64,6 +64,10 @@ fn axis_object(kind: AxisKind, motor: MotorKind) -> Value {
         let path = format!("axes.*.{table}");
         set(&mut axis, &["properties", table], object(&path, Some(kind), Some(motor)));
     }
+    if (kind, motor) == (AxisKind::Linear, MotorKind::Rotary) {
+        let one_of = json!([{ "required": ["pitch_mm"] }, { "required": ["pinion_diameter_mm"] }]);
+        set(&mut axis, &["properties", "mechanics", "oneOf"], one_of);
+    }
     if kind == AxisKind::Rotary {
         push(&mut axis, &["properties", "mechanics", "required"], json!("gear_ratio"));
     }

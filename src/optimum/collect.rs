@@ -46,7 +46,9 @@ impl Collector {
     /// The next piece of the path.
     pub fn push(&mut self, planned: &PlannedPiece) {
         let path = &planned.path;
-        if path.contour.curve().is_some() {
+        // A thread goes as its spindle does.
+        let free = path.contour.modes.thread.is_none();
+        if path.contour.curve().is_some() && free {
             let law = Arc::new(planned.law.clone());
             let mut from_lu = 0.0;
             for part in smooth(path) {

@@ -3,7 +3,7 @@
 //! In: a number. Out: its [`GFunction`] and group, or why there is none. Words of a G group that have a name stand in `words`.
 
 use super::not_acted_on::NotActedOn;
-use super::word_kinds::{ExactStop, FeedType, PoleOrigin, Suppression};
+use super::word_kinds::{ExactStop, FeedType, PoleOrigin, Suppression, ThreadWord};
 use super::words::{Role, role};
 use crate::machine::PathMode;
 
@@ -18,6 +18,8 @@ pub enum GFunction {
     Clockwise,
     /// G3.
     CounterClockwise,
+    /// G33, G34, G35, G331, G332.
+    Thread(ThreadWord),
     /// G4.
     Dwell,
     /// G9.
@@ -76,7 +78,7 @@ impl GFunction {
     /// Its G group: two of one group cannot stand in one block. 0: no group (G4, G9, suppression).
     pub fn group(&self) -> u8 {
         match self {
-            Self::Rapid | Self::Line | Self::Clockwise | Self::CounterClockwise => 1,
+            Self::Rapid | Self::Line | Self::Clockwise | Self::CounterClockwise | Self::Thread(_) => 1,
             Self::Dwell | Self::ExactStopOnce | Self::SuppressFrames(_) => 0,
             Self::AxialOffset(_) | Self::Pole(_) | Self::Limit(_) => 3,
             Self::ExactStopWindow(_) => 12,
@@ -105,6 +107,11 @@ pub fn g_function(number: u32) -> Result<GFunction, &'static str> {
         19 => GFunction::Plane(Plane::G19),
         25 => GFunction::Limit(false),
         26 => GFunction::Limit(true),
+        33 => GFunction::Thread(ThreadWord::Constant),
+        34 => GFunction::Thread(ThreadWord::Rising),
+        35 => GFunction::Thread(ThreadWord::Falling),
+        331 => GFunction::Thread(ThreadWord::Tap),
+        332 => GFunction::Thread(ThreadWord::Retract),
         53 => GFunction::SuppressFrames(Suppression::Settable),
         153 => GFunction::SuppressFrames(Suppression::Basic),
         58 => GFunction::AxialOffset(true),

@@ -284,6 +284,8 @@ pub enum Address {
     Radius,
     /// TURN.
     Turn,
+    /// SF.
+    StartAngle,
     /// F.
     Feed,
     /// S.

@@ -142,6 +142,21 @@ pub enum FeedType {
     SpeedPerRevolutionFree,
 }
 
+/// G functions of group 1 that tie the path to the master spindle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ThreadWord {
+    /// G33: constant lead.
+    Constant,
+    /// G34: the lead grows by F a revolution.
+    Rising,
+    /// G35: the lead shrinks by F a revolution.
+    Falling,
+    /// G331: tapping, the spindle is positioned with the axis.
+    Tap,
+    /// G332: back out of the thread.
+    Retract,
+}
+
 /// From where polar coordinates count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoleOrigin {

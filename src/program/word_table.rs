@@ -91,6 +91,7 @@ pub(super) const ACTED_ON: &[(&str, Role)] = &[
     ("STOPRE", Role::Keyword(Keyword::StopPreparation)),
     ("CR", Role::Address(Address::Radius)),
     ("TURN", Role::Address(Address::Turn)),
+    ("SF", Role::Address(Address::StartAngle)),
     ("ADIS", Role::Address(Address::RoundingDistance)),
     ("ADISPOS", Role::Address(Address::RapidRoundingDistance)),
     ("CTOL", Role::Address(Address::ContourTolerance)),

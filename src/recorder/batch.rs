@@ -5,7 +5,7 @@
 use super::event::EventRecord;
 use super::schema::ToolPose;
 use crate::base::{AxisId, Tick};
-use crate::drive::AxisSignals;
+use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
 use crate::interpreter::ProgrammedBlock;
 use crate::program::{BlockRef, OpenedProgram};
@@ -31,6 +31,10 @@ pub(super) enum Record {
         tick: Tick,
         sample: PathSample,
         contour_error_mm: Option<f64>,
+    },
+    Spindle {
+        tick: Tick,
+        signals: SpindleSignals,
     },
     Pose {
         tick: Tick,
@@ -58,6 +62,7 @@ impl Record {
         match self {
             Self::Axis { tick, .. }
             | Self::Path { tick, .. }
+            | Self::Spindle { tick, .. }
             | Self::Pose { tick, .. }
             | Self::Event { tick, .. }
             | Self::Programmed { tick, .. }

@@ -4,11 +4,11 @@
 //! so that newer recordings stay readable. Does not read files.
 
 use super::schema::proto::foxglove::PoseInFrame;
-use super::schema::proto::sollwert::{Event, Path, Programmed, Sample};
+use super::schema::proto::sollwert::{Event, Path, Programmed, Sample, Spindle};
 use super::schema::{
     AXIS_FIELD_COUNT, AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, FLAGS_FIELD, LINEAR_AXIS, MONITORING_FIELD, PATH,
-    PATH_TOPIC, POSE_IN_FRAME, PROGRAMMED, PROGRAMMED_TOPIC, ROTARY_AXIS, SAMPLE, SIGNAL_TOPIC_PREFIX, TOOL_TOPICS,
-    ToolPose,
+    PATH_TOPIC, POSE_IN_FRAME, PROGRAMMED, PROGRAMMED_TOPIC, ROTARY_AXIS, SAMPLE, SIGNAL_TOPIC_PREFIX, SPINDLE,
+    SPINDLE_TOPIC, TOOL_TOPICS, ToolPose,
 };
 use crate::base::AxisKind;
 use prost::Message as _;
@@ -28,6 +28,8 @@ pub enum TopicKind {
     Path,
     /// Events.
     Event,
+    /// The master spindle.
+    Spindle,
     /// What the program asks of the path.
     Programmed,
     /// A pose of the tool.
@@ -52,6 +54,7 @@ impl TopicKind {
             }
             (None, PATH_TOPIC) if schema == PATH.name => Self::Path,
             (None, EVENT_TOPIC) if schema == EVENT.name => Self::Event,
+            (None, SPINDLE_TOPIC) if schema == SPINDLE.name => Self::Spindle,
             (None, PROGRAMMED_TOPIC) if schema == PROGRAMMED.name => Self::Programmed,
             (None, topic) if schema == POSE_IN_FRAME.name && topic == TOOL_TOPICS[0] => Self::Pose(ToolPose::Setpoint),
             (None, topic) if schema == POSE_IN_FRAME.name && topic == TOOL_TOPICS[1] => Self::Pose(ToolPose::Actual),
@@ -127,6 +130,8 @@ pub enum Content {
     Path(Box<Path>),
     /// An event.
     Event(Box<Event>),
+    /// The master spindle.
+    Spindle(Box<Spindle>),
     /// What the program asks of the path.
     Programmed(Box<Programmed>),
     /// A pose of the tool, in metres.
@@ -143,6 +148,7 @@ impl Content {
             TopicKind::Axis { .. } => Self::Axis(AxisSample::decode(data)?),
             TopicKind::Path => Self::Path(Box::new(Path::decode(data)?)),
             TopicKind::Event => Self::Event(Box::new(Event::decode(data)?)),
+            TopicKind::Spindle => Self::Spindle(Box::new(Spindle::decode(data)?)),
             TopicKind::Programmed => Self::Programmed(Box::new(Programmed::decode(data)?)),
             TopicKind::Pose(which) => Self::Pose(*which, Box::new(PoseInFrame::decode(data)?)),
             TopicKind::Signal { .. } => Self::Sample(Sample::decode(data)?),

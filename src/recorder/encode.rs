@@ -7,11 +7,11 @@ use super::batch::Record;
 use super::event::EventRecord;
 use super::schema::proto::foxglove::{Pose, PoseInFrame, Quaternion, Vector3};
 use super::schema::proto::google::protobuf::Timestamp;
-use super::schema::proto::sollwert::{Event, Path, Programmed};
+use super::schema::proto::sollwert::{Event, Path, Programmed, Spindle};
 use super::schema::{AXIS_FIELDS, FLAGS_FIELD, FieldUnit, MONITORING_FIELD, POSE_FRAME};
-use crate::base::units::{MM_PER_M, NS_PER_S, deg_from_rad, mm_min_from_mm_s};
+use crate::base::units::{MM_PER_M, NS_PER_S, deg_from_rad, mm_min_from_mm_s, rot_from_rad, rpm_from_rad_s};
 use crate::base::{AxisKind, AxisVector, PerAxis};
-use crate::drive::AxisSignals;
+use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
 use crate::interpreter::ProgrammedBlock;
 use crate::machine::Machine;
@@ -140,6 +140,7 @@ impl RunEncoder {
             Record::Pose { position_mm, quaternion_xyzw, .. } => {
                 self.encode_pose(time_ns, *position_mm, *quaternion_xyzw, buffer);
             }
+            Record::Spindle { signals, .. } => self.encode_spindle(signals, buffer),
             Record::Event { block, event, .. } => {
                 let message = self.event_message(*block, event);
                 message.encode_raw(buffer);
@@ -175,6 +176,19 @@ impl RunEncoder {
         path.rotary_only = Some(sample.rotary_only);
         path.encode_raw(buffer);
         self.path = path;
+    }
+
+    fn encode_spindle(&self, signals: &SpindleSignals, buffer: &mut Vec<u8>) {
+        let round = |value: f64| Some(self.precision.round(value));
+        let SpindleSignals { setpoint, angle_actual_rad, speed_actual_rad_s } = signals;
+        let message = Spindle {
+            angle_setpoint_deg: round(deg_from_rad(setpoint.angle_rad)),
+            angle_actual_deg: round(deg_from_rad(*angle_actual_rad)),
+            speed_setpoint_rpm: round(rpm_from_rad_s(setpoint.speed_rad_s)),
+            speed_actual_rpm: round(rpm_from_rad_s(*speed_actual_rad_s)),
+            acceleration_setpoint_rot_s2: round(rot_from_rad(setpoint.acceleration_rad_s2)),
+        };
+        message.encode_raw(buffer);
     }
 
     fn encode_pose(&mut self, time_ns: u64, position_mm: [f64; 3], quaternion_xyzw: [f64; 4], buffer: &mut Vec<u8>) {

@@ -72,10 +72,13 @@ impl From<&Event> for EventRecord {
             Event::Trace(starts) => Self::Trace(*starts),
             Event::HFunction(value) => Self::HFunction(*value),
             Event::Spindle(text) => Self::Spindle(text.clone()),
-            // The axes and the override themselves are on record.
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::Programmed(_) => {
-                Self::BlockStart
-            }
+            Event::SpindlePosition(positioning) => Self::Spindle(positioning.text.clone()),
+            // The axes, the override and the spindle themselves are on record.
+            Event::Position(_)
+            | Event::Synchronised(_)
+            | Event::CancelSynchronised(_)
+            | Event::SpindleWait
+            | Event::Programmed(_) => Self::BlockStart,
         }
     }
 }

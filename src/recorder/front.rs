@@ -11,7 +11,7 @@ use super::target::Target;
 use super::writer::{Fault, RecordingSummary, RecordingWriter, write_fault};
 use crate::base::units::NS_PER_S;
 use crate::base::{AXES_MAX, AxisId, Diagnostic, PerAxis, Tick, TimeBase};
-use crate::drive::AxisSignals;
+use crate::drive::{AxisSignals, SpindleSignals};
 use crate::interpolator::{AxisSetpoint, PathSample};
 use crate::interpreter::Event;
 use crate::program::{BlockRef, OpenedProgram, ProgramId};
@@ -41,6 +41,7 @@ pub struct Recorder {
     attached: Vec<ProgramId>,
     axis_decimators: PerAxis<AxisDecimator>,
     path_decimator: Decimator,
+    spindle_decimator: Decimator,
 }
 
 impl Recorder {
@@ -89,6 +90,7 @@ impl Recorder {
             attached: setup.programs.iter().map(|program| program.id).collect(),
             axis_decimators: PerAxis::from_fn(|axis| AxisDecimator::new(&signals.groups(axis), every)),
             path_decimator: Decimator::new(every),
+            spindle_decimator: Decimator::new(every),
         })
     }
 
@@ -107,6 +109,13 @@ impl Recorder {
     pub fn path(&mut self, tick: Tick, sample: &PathSample, contour_error_mm: Option<f64>) {
         let record = Record::Path { tick, sample: *sample, contour_error_mm };
         if let Some(record) = self.path_decimator.pass(record) {
+            self.push(record);
+        }
+    }
+
+    /// The master spindle at a set-point; recorded where the machine file has one.
+    pub fn spindle(&mut self, tick: Tick, signals: &SpindleSignals) {
+        if let Some(record) = self.spindle_decimator.pass(Record::Spindle { tick, signals: *signals }) {
             self.push(record);
         }
     }
@@ -132,7 +141,8 @@ impl Recorder {
         }
         match event {
             Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) => {}
+            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {}
+            Event::SpindlePosition(positioning) if positioning.text.is_empty() => {}
             _ => self.event(tick, Some(block), event.into()),
         }
     }
@@ -155,6 +165,7 @@ impl Recorder {
         let axes = AxisId::first(AXES_MAX);
         let mut last: Vec<Record> = axes.filter_map(|axis| self.axis_decimators[axis].rest(axis)).collect();
         last.extend(self.path_decimator.rest());
+        last.extend(self.spindle_decimator.rest());
         last.sort_by_key(Record::tick);
         for record in last {
             self.push(record);

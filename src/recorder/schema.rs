@@ -19,6 +19,8 @@ pub const RECORDING_FORMAT: u32 = 1;
 pub const PATH_TOPIC: &str = "/path";
 /// Topic of the events.
 pub const EVENT_TOPIC: &str = "/event";
+/// Topic of the master spindle, where the machine file has `[spindle]`.
+pub const SPINDLE_TOPIC: &str = "/spindle";
 /// Topic of what the program asks for.
 pub const PROGRAMMED_TOPIC: &str = "/programmed";
 /// Topics of the tool poses, by [`ToolPose`].
@@ -68,6 +70,9 @@ pub const PATH: SchemaText =
 /// Schema of the events.
 pub const EVENT: SchemaText =
     SchemaText { name: "sollwert.Event", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/event.fds")) };
+/// Schema of the master spindle.
+pub const SPINDLE: SchemaText =
+    SchemaText { name: "sollwert.Spindle", descriptors: include_bytes!(concat!(env!("OUT_DIR"), "/spindle.fds")) };
 /// Schema of what the program asks for.
 pub const PROGRAMMED: SchemaText = SchemaText {
     name: "sollwert.Programmed",

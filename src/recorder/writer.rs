@@ -11,7 +11,7 @@ use super::mcap_file::{AttachmentHead, Declarations, McapFile, RawChunk, RecordB
 use super::packing::{Packing, Piece, attach_program};
 use super::schema::{
     AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, LINEAR_AXIS, PATH, PATH_TOPIC, POSE_IN_FRAME, PROGRAMMED, PROGRAMMED_TOPIC,
-    ROTARY_AXIS, SchemaText, TOOL_TOPICS,
+    ROTARY_AXIS, SPINDLE, SPINDLE_TOPIC, SchemaText, TOOL_TOPICS,
 };
 use super::setup::{Compression, MACHINE_MEDIA_TYPE, RecordingSetup};
 use super::target::Target;
@@ -182,6 +182,7 @@ impl RecordingWriter {
             Record::Path { .. } => Some(&mut topics.path),
             Record::Event { .. } => Some(&mut topics.event),
             Record::Programmed { .. } => topics.programmed.as_mut(),
+            Record::Spindle { .. } => topics.spindle.as_mut(),
             Record::Pose { which, .. } => topics.poses[which.index()].as_mut(),
             Record::Program { program, .. } => {
                 run_encoder.add_program(program.id, &program.name);
@@ -236,6 +237,7 @@ struct Topics {
     axes: PerAxis<Option<Channel>>,
     path: Channel,
     event: Channel,
+    spindle: Option<Channel>,
     programmed: Option<Channel>,
     poses: [Option<Channel>; TOOL_TOPICS.len()],
 }
@@ -262,12 +264,14 @@ fn topics(setup: &RecordingSetup) -> (Topics, Declarations) {
     let nothing = BTreeMap::new();
     let path = add(PATH_TOPIC, PATH, &nothing);
     let event = add(EVENT_TOPIC, EVENT, &nothing);
+    let spindle =
+        (setup.machine.spindle.is_some() && !setup.programs.is_empty()).then(|| add(SPINDLE_TOPIC, SPINDLE, &nothing));
     let mut poses = [None; TOOL_TOPICS.len()];
     for (index, topic) in TOOL_TOPICS.into_iter().enumerate().filter(|(index, _)| signals.pose(*index)) {
         poses[index] = Some(add(topic, POSE_IN_FRAME, &nothing));
     }
     let programmed = setup.programmed.then(|| add(PROGRAMMED_TOPIC, PROGRAMMED, &nothing));
-    (Topics { axes, path, event, programmed, poses }, declarations)
+    (Topics { axes, path, event, spindle, programmed, poses }, declarations)
 }
 
 /// Numbers of schemas and channels count from 1; a schema is declared once.

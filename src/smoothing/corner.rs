@@ -18,6 +18,8 @@
 //! G645 have their tolerances times STOLF; next to one rapid they do not. Where the compressor has moved a block, a blend has what is left
 //! of the tolerance.
 //!
+//! Threads are not rounded: the path rests before and after them, and goes on where one G33 follows another.
+//!
 //! Does not cut the blocks: that is the smoother's.
 
 use super::Corner;
@@ -25,7 +27,7 @@ use super::dynamics::Dynamics;
 use super::transition::{Pair, Tolerances, common, enough, per_axis};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Curve, CurveState, DISPLACEMENT_MIN_LU, HermiteBlend, Line, QuinticShape};
-use crate::interpreter::{Feed, Modes};
+use crate::interpreter::{Feed, Modes, ThreadCoupling};
 use crate::machine::{BlendShape, Machine, PathMode, SmoothingSettings};
 use std::sync::Arc;
 
@@ -53,6 +55,13 @@ const CURVATURE_STEP_MIN_RATIO: f64 = 1e-6;
 /// what they miss between them.
 const MOVED_SAMPLES: usize = 8;
 const MOVED_RESERVE_RATIO: f64 = 1.05;
+
+/// A thread that is cut on without a new start angle.
+fn goes_on(before: &Modes, after: &Modes) -> bool {
+    let cuts = before.thread.as_ref().is_some_and(|thread| thread.is_cut());
+    let on = ThreadCoupling::Cut { start_angle_rad: None };
+    cuts && after.thread.as_ref().is_some_and(|thread| thread.coupling == on)
+}
 
 /// One of the two blocks at a junction.
 pub(super) struct Side<'a> {
@@ -106,6 +115,9 @@ impl Rules {
         let unit_changes = before.curve.rotary_only() != after.curve.rotary_only();
         if mode == PathMode::ExactStop || unit_changes {
             return Junction::Stop;
+        }
+        if before.modes.thread.is_some() || after.modes.thread.is_some() {
+            return if goes_on(before.modes, after.modes) { Junction::Pass } else { Junction::Stop };
         }
         // What has no length has no corner either: such a block goes on whole, and feed refuses it.
         let measurable = before.curve.length_lu().is_finite() && after.curve.length_lu().is_finite();

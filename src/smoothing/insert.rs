@@ -95,6 +95,10 @@ pub(super) fn inserted(
     if before.curve.end() != after.curve.start() {
         return Err(Omitted::Shape);
     }
+    // A thread stays whole.
+    if before.head.modes.thread.is_some() || after.head.modes.thread.is_some() {
+        return Err(Omitted::Shape);
+    }
     let plane = Basis::new(insert);
     let corner = plane.projected(&before.curve.end().0);
     let first = Side::new(&before.curve, &plane, before.curve.length_lu() - before.head_lu, true)?;

@@ -1,7 +1,7 @@
 //! What the control watches (docs/drive.md section 8): the contour deviation in closed form, windows and times recomputed from the signals.
 
-use crate::rig::{Rig, machines, mvc_x};
-use sollwert::drive::{AxisSignals, monitoring};
+use crate::rig::{Rig, input, machines, mvc_x};
+use sollwert::drive::{AxisSignals, flags, monitoring};
 
 fn smooth(rig: Rig) -> Rig {
     rig.with(|data| (data.mechanics.gravity_sin_n_m, data.mechanics.gravity_cos_n_m) = (0.0, 0.0))
@@ -94,6 +94,49 @@ fn bits_are_what_the_documentation_says() {
         seen |= bits;
     }
     assert_eq!(seen, 31, "every bit must be met");
+}
+
+/// MD36220: the bit comes when the speed set-point has been at its limit for longer than the time, and goes with it.
+#[test]
+fn the_speed_limit_is_seen_after_its_time() {
+    let rig = mvc_x().with(|data| {
+        data.speed_setpoint_max_lu_s = 100.0;
+        data.monitoring.speed_limit_time_s = 0.05;
+    });
+    let signals = rig.follow(1.0, |t_s| if t_s < 0.1 { 0.0 } else { 20.0 });
+    let mut limited = 0_u32;
+    let mut seen = 0;
+    for (k, s) in signals.iter().enumerate() {
+        limited = if s.flags & flags::SPEED_CLAMP != 0 { limited + 1 } else { 0 };
+        let wanted = f64::from(limited) * rig.position_period_s() > 0.05;
+        assert_eq!(s.monitoring & monitoring::SPEED_LIMIT != 0, wanted, "row {k}");
+        seen += u32::from(wanted);
+    }
+    assert!(seen > 50, "{seen}");
+    let free = mvc_x().with(|data| data.speed_setpoint_max_lu_s = 100.0);
+    assert!(free.follow(1.0, |_| 20.0).iter().all(|s| s.monitoring & monitoring::SPEED_LIMIT == 0));
+}
+
+/// After an alarm the speed set-point is a straight ramp to 0, whatever the position, and the axis comes to rest.
+#[test]
+fn an_axis_brakes_on_a_ramp() {
+    let rig = mvc_x();
+    let period_s = rig.position_period_s();
+    let mut drive = rig.drive(0.0);
+    let mut last = AxisSignals::default();
+    for k in 0..400 {
+        last = drive.step(input(100.0 * f64::from(k) * period_s));
+    }
+    let from = last.velocity_command_lu_s;
+    assert!((from - 100.0).abs() < 0.1);
+    drive.brake(from, 0.05);
+    for k in 1..=120 {
+        let s = drive.step(input(1000.0));
+        let wanted = from * (1.0 - f64::from(k) * period_s / 0.05).max(0.0);
+        assert!((s.velocity_command_lu_s - wanted).abs() < 1e-9, "{k}: {} {wanted}", s.velocity_command_lu_s);
+        last = s;
+    }
+    assert!(last.velocity_actual_lu_s.abs() < 0.5, "{}", last.velocity_actual_lu_s);
 }
 
 /// The deviation itself, with the model written down once more.

@@ -132,6 +132,36 @@ fn jerk_filters_at_rest_and_on_a_ramp() {
     assert!(passed_lu < 1e-12, "{passed_lu:e} of the blocked frequency passes");
 }
 
+/// MD32402 = 5: symmetric weights with the sum 1 delay a ramp and a slow sine by half their length, and leave little above the cut-off.
+#[test]
+fn a_fir_low_pass_delays_everything_alike() {
+    let rig = linear(mvc_x());
+    let period_s = rig.position_period_s();
+    let fir = JerkFilter { frequency_hz: 25.0, ..jerk_filter(Kind::FirLowPass, 41e-3, 0.0) };
+    let rig = rig.with(|data| data.options.jerk_filter = fir);
+    let delay_s = 20.0 * period_s;
+    let (last, v) = ramp(&rig);
+    let late_s = (last.position_setpoint_lu - last.position_reference_lu) / v;
+    assert!((late_s - delay_s).abs() < 1e-12, "{late_s} s late");
+    assert!(last.control_deviation_lu.abs() < 1e-11 * v);
+    for (frequency_hz, least, most) in [(3.0, 0.9, 1.0), (100.0, 0.0, 0.01), (300.0, 0.0, 0.01)] {
+        let sine = |t_s: f64| (TAU * frequency_hz * t_s).sin();
+        let signals = rig.follow(1.0, sine);
+        let gain = signals[500..].iter().map(|s| s.position_reference_lu.abs()).fold(0.0, f64::max);
+        assert!(gain >= least && gain <= most, "{frequency_hz} Hz: {gain}");
+        // No phase but that of the delay: what is left is the delayed sine times one number, which may be negative.
+        let delayed = |k: usize| sine(k as f64 * period_s - delay_s);
+        let at = (500..900).max_by(|a, b| delayed(*a).abs().total_cmp(&delayed(*b).abs())).unwrap();
+        let ratio = signals[at].position_reference_lu / delayed(at);
+        for (k, signal) in signals.iter().enumerate().take(900).skip(500) {
+            let apart = signal.position_reference_lu - ratio * delayed(k);
+            assert!(apart.abs() < 1e-9, "{frequency_hz} Hz, {k}: {apart:e}");
+        }
+    }
+    let rests = rig.run((0..60).map(|_| input(0.3)));
+    assert!(rests.iter().all(|s| s.position_reference_lu == 0.3), "at rest it keeps its bits");
+}
+
 /// FFW_MODE 1, 2: x_ref is a geometric sequence after a step, late by T on a ramp, and the lag in acceleration is that of a dead
 /// time T (the reference is as much slower).
 #[test]

@@ -7,7 +7,7 @@
 
 use crate::rig::{self, Rig, input};
 use sollwert::drive::{AxisSignals, DriveInput, flags};
-use sollwert::machine::{ErrorTable, PositionSource};
+use sollwert::machine::{ErrorTable, FrictionAdaptation, PositionSource};
 use std::f64::consts::TAU;
 
 const REFERENCE: &str = include_str!("reference.csv");
@@ -100,6 +100,31 @@ fn tilting_table_with_quantised_encoders_from_a_cold_start() {
         data.encoder.motor_resolution_rad = 2e-4;
     });
     compare("tilt", &rig.run(setpoints(131, |k| 0.3 + 0.05 * (1.0 - (TAU * 4.0 * k * 2e-3).cos()))));
+}
+
+/// Reversals with play, its compensation, and a friction pulse that follows the acceleration through all four of its pieces.
+#[test]
+fn reversals_with_play_and_an_adapted_pulse() {
+    let accelerations_lu_s2 = [200.0, 600.0, 1200.0];
+    let rig = rig::mvc_y().with(|data| {
+        data.velocity_feedforward_ratio = 1.0;
+        data.encoder.position_source = PositionSource::Motor;
+        data.mechanics.backlash_lu = 0.02;
+        data.options.backlash_compensation_lu = 0.015;
+        data.options.friction_pulse_lu_s = 6.0;
+        data.options.friction_pulse_time_s = 0.012;
+        data.options.friction_adaptation = Some(FrictionAdaptation { lowest_lu_s: 1.5, accelerations_lu_s2 });
+    });
+    let points: Vec<f64> = (0..801).map(f64::from).map(|k| 2e-6 * k * k * (TAU * 6.0 * k * 1e-3).sin()).collect();
+    let velocity = |k: usize| (points[k] - points[k - 1]) / 1e-3;
+    let reversals = (2..points.len()).filter(|k| velocity(*k) * velocity(k - 1) < 0.0);
+    let mut met = [0; 4];
+    for k in reversals {
+        let a = (velocity(k) - velocity(k - 1)).abs() / 1e-3;
+        met[accelerations_lu_s2.iter().filter(|limit| a > **limit).count()] += 1;
+    }
+    assert!(met.iter().all(|count| *count > 0), "{met:?}");
+    compare("reversal_pulse", &rig.run(points.iter().map(|point| input(*point))));
 }
 
 #[test]

@@ -14,4 +14,5 @@ mod sampled;
 mod spindle;
 mod support;
 mod synchronised;
+mod thread;
 mod window;

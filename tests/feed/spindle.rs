@@ -11,7 +11,14 @@ use std::f64::consts::TAU;
 fn machine(time_law: TimeLawKind) -> Machine {
     let mut machine = spinner();
     machine.feed.time_law = time_law;
-    machine.spindle = Some(SpindleSettings { acceleration_rad_s2: 30.0 * TAU, tolerance_share: 0.1 });
+    machine.spindle = Some(SpindleSettings {
+        acceleration_rad_s2: 30.0 * TAU,
+        tolerance_share: 0.1,
+        waits_for_stop: false,
+        positioning_speed_rad_s: 5.0 * TAU,
+        positioning_acceleration_rad_s2: 30.0 * TAU,
+        lag_s: 0.0,
+    });
     machine
 }
 
@@ -63,7 +70,7 @@ fn a_feed_waits_until_the_spindle_is_near_its_speed() {
 fn nothing_waits_without_a_change_or_without_a_spindle() {
     let with = machine(TimeLawKind::Continuous);
     let without = Machine { spindle: None, ..with.clone() };
-    let careless = SpindleSettings { tolerance_share: 0.0, acceleration_rad_s2: 1.0 };
+    let careless = SpindleSettings { tolerance_share: 1.0, acceleration_rad_s2: 1.0, ..with.spindle.unwrap() };
     let careless = Machine { spindle: Some(careless), ..with.clone() };
     let text = "G0 X50 S3000 M3\nG4 F5\nG1 X60 F1000\nM3 S3000 X100\nM5\nX110\nM30\n";
     // The first feed comes late enough; the same speed again is no change, and a spindle at rest is not waited for.
@@ -83,4 +90,17 @@ fn the_path_rests_while_it_waits_and_events_come_first() {
     assert!(before.at(before.duration_s()).velocity_lu_s < 1e-9);
     assert_eq!(pieces[wait + 1].law.at(0.0).velocity_lu_s, 0.0);
     assert!(pieces[wait + 1].path.contour.events.is_empty() && pieces[wait + 1].path.contour.blocks_begun == 1);
+}
+
+#[test]
+fn a_feed_behind_m5_waits_where_the_machine_says_so() {
+    let mut machine = machine(TimeLawKind::Continuous);
+    let text = "G1 X1 F1000 S3000 M3\nM5\nX2\nM30\n";
+    assert_eq!(waits(&planned(&machine, text)).len(), 1);
+    machine.spindle = machine.spindle.map(|spindle| SpindleSettings { waits_for_stop: true, ..spindle });
+    let waits = waits(&planned(&machine, text));
+    // From whatever speed it had reached back to rest, at 30 rev/s².
+    let (ramp_s, driven_s) = (0.9 * 50.0 / 30.0, waits[1].1 - waits[0].2);
+    let reached_rps = (30.0 * (ramp_s + driven_s)).min(50.0);
+    assert!((waits[1].2 - reached_rps / 30.0).abs() < 1e-9, "{waits:?}");
 }

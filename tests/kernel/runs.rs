@@ -132,15 +132,29 @@ fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
     assert!(recordings.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
-/// Values of a field of the axis X, row by row.
+/// Values of a field of the axis X, row by row, up to an alarm: behind it the axes brake.
 fn column(path: &Path, field: &str) -> Vec<f64> {
+    let alarm_ns = alarm_ns(path).unwrap_or(u64::MAX);
+    timed_column(path, field).into_iter().filter(|(time_ns, _)| *time_ns <= alarm_ns).map(|(_, value)| value).collect()
+}
+
+/// When the alarm came.
+fn alarm_ns(path: &Path) -> Option<u64> {
+    let recording = Recording::open(path).unwrap();
+    recording.messages().unwrap().map(Result::unwrap).find_map(|message| match message.content {
+        Content::Event(event) if event.kind.as_deref() == Some("alarm") => Some(message.time_ns),
+        _ => None,
+    })
+}
+
+fn timed_column(path: &Path, field: &str) -> Vec<(u64, f64)> {
     let recording = Recording::open(path).unwrap();
     let field = axis_field(field).unwrap();
     let topic = recording.topics().iter().position(|topic| topic.name == "/axis/X").unwrap();
     let of_axis = |message: &sollwert::recorder::Message| message.topic == topic;
     let values = recording.messages().unwrap().map(Result::unwrap).filter(of_axis).map(|message| {
         let Content::Axis(sample) = message.content else { panic!("an axis") };
-        sample.get(field).unwrap()
+        (message.time_ns, sample.get(field).unwrap())
     });
     values.collect()
 }
@@ -166,6 +180,19 @@ fn the_control_stops_an_axis_that_leaves_its_model_and_the_recording_goes_up_to_
             assert_eq!(beyond, [deviation.len() - 1], "{name}: the row with the alarm is the last one");
             assert_eq!(deviation.len() as u64, outcome.summary.setpoints + 1);
             assert_eq!(Recording::open(&path).unwrap().summary().unwrap()["alarm"]["code"], "D0004");
+            // Behind the alarm: a straight ramp of the speed set-point to 0 in 50 ms, and the axis comes to rest.
+            let alarm_ns = alarm_ns(&path).unwrap();
+            let commands = timed_column(&path, "velocity_command");
+            let from = commands.iter().find(|(time_ns, _)| *time_ns == alarm_ns).unwrap().1;
+            let behind: Vec<_> = commands.iter().filter(|(time_ns, _)| *time_ns > alarm_ns).collect();
+            assert!(behind.len() >= 50 && from.abs() > 1.0, "{name}: {} rows from {from}", behind.len());
+            for (time_ns, command) in behind {
+                let since_s = (time_ns - alarm_ns) as f64 * 1e-9;
+                let wanted = from * (1.0 - since_s / 0.05).max(0.0);
+                assert!((command - wanted).abs() < 1e-9 * from.abs(), "{name}, {since_s}: {command} {wanted}");
+            }
+            let speeds = timed_column(&path, "velocity_actual");
+            assert!(speeds[speeds.len() - 1].1.abs() < 0.01 * from.abs(), "{name}: {:?}", speeds.last());
             recordings.push(std::fs::read(&path).unwrap());
         }
         assert!(recordings[0] == recordings[1], "{name}");
@@ -210,6 +237,80 @@ fn an_axis_that_never_arrives_is_an_alarm_and_no_hang() {
     // With G603 the block ends with its set-point: the axis sets out again before anybody asks.
     let free = record("G60 G603 G1 X30 F3000\nX0\nM30\n", &loaded, 2, &scratch("free.mcap"));
     assert!(free.alarm.is_none() && !free.summary.limits.contains_key("in_position"));
+}
+
+/// M10 clamps X, M11 releases it: a clamped axis that moves is alarm 26000; one that stands, or was released, is none.
+#[test]
+fn a_clamped_axis_that_moves_is_an_alarm() {
+    let sets =
+        ["axes.X.drive.clamp_m_function=10", "axes.X.drive.release_m_function=11", "axes.X.drive.clamping_um=50"];
+    let loaded = machine("spinner_mvc850", &sets);
+    let path = scratch("clamped.mcap");
+    let outcome = record("G1 X30 F3000\nG4 F0.2\nM10\nG1 G9 Y20\nX31\nM30\n", &loaded, 2, &path);
+    let alarm = outcome.alarm.expect("an alarm");
+    assert!(alarm.code == "D0007" && alarm.message.contains("axis X") && alarm.message.contains("line 5"), "{alarm:?}");
+    let measured = column(&path, "position_measured");
+    let last = measured[measured.len() - 1];
+    assert!((last - 30.0).abs() > 0.05 && (measured[measured.len() - 2] - 30.0).abs() <= 0.0501, "{last}");
+    let free = record("G1 X30 F3000\nM10\nG1 Y20\nM11\nX31\nM30\n", &loaded, 2, &scratch("released.mcap"));
+    assert!(free.alarm.is_none(), "{:?}", free.alarm);
+}
+
+/// MD36220: an axis that is asked for more speed than its drive turns.
+#[test]
+fn a_speed_setpoint_that_stays_at_its_limit_is_an_alarm() {
+    let sets = [
+        "axes.X.drive.speed_setpoint_max_mm_s=40",
+        "axes.X.drive.speed_limit_time_ms=30",
+        "axes.X.drive.contour_monitoring_um=inf",
+    ];
+    let loaded = machine("spinner_mvc850", &sets);
+    let outcome = record("G1 X30 F3000\nM30\n", &loaded, 2, &scratch("limited.mcap"));
+    let alarm = outcome.alarm.expect("an alarm");
+    assert!(alarm.code == "D0008" && alarm.message.contains("25060"), "{alarm:?}");
+}
+
+/// The times of `--override` are those of the run: a wait for the axes before a change does not put it off.
+#[test]
+fn a_change_of_the_override_comes_at_its_time_behind_waits() {
+    let sets =
+        ["feed.time_law=continuous", "axes.X.drive.position_gain_per_s=10", "axes.X.drive.velocity_feedforward=0"];
+    let loaded = machine("spinner_mvc850", &sets);
+    let text = "G60 G1 X10 F6000\nX0\nX10\nG64 X300 F3000\nM30\n";
+    let mut recordings = Vec::new();
+    for threads in [1, 2] {
+        let path = scratch(&format!("override_wait_{threads}.mcap"));
+        let options = RunOptions {
+            machine: &loaded,
+            setup: program(text).into(),
+            overrides: OverrideSchedule::parse("4=50").unwrap(),
+            drives: true,
+            recording: Some(&path),
+            mantissa_bits: None,
+            signals: SignalChoice::all(),
+            threads,
+            pace_ratio: None,
+        };
+        let outcome = run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{:?}", error.0));
+        assert!(outcome.summary.limits["in_position"] * outcome.summary.cycle_time_s > 1.0);
+        let recording = Recording::open(&path).unwrap();
+        let mut before = 1.0;
+        for message in recording.messages().unwrap().map(Result::unwrap) {
+            let Content::Path(sample) = message.content else { continue };
+            let ratio = sample.override_ratio.unwrap();
+            let time_s = message.time_ns as f64 * 1e-9;
+            assert_eq!(ratio, if time_s < 4.0 { 1.0 } else { 0.5 }, "{time_s}");
+            // The feed falls from its 50 mm/s only then.
+            let feed = sample.feed_mm_min.unwrap();
+            if time_s > 3.5 {
+                assert!(feed <= before || time_s > 4.5 || feed <= 3000.0 * (1.0 + 1e-9));
+                assert!(time_s > 4.0 || (feed - 3000.0).abs() < 1e-6, "{time_s}: {feed}");
+            }
+            before = feed;
+        }
+        recordings.push(std::fs::read(&path).unwrap());
+    }
+    assert!(recordings[0] == recordings[1]);
 }
 
 /// STOPRE asks for the time of the main run, which includes what exact stops have waited; on any number of threads.

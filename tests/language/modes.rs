@@ -443,7 +443,7 @@ fn a_tool_without_data_is_reported_once() {
 
 #[test]
 fn words_that_would_change_the_motion_are_errors() {
-    for text in ["TRAORI", "A3=0 B3=0 C3=1", "TOFRAME", "G33 Z1 K1"] {
+    for text in ["TRAORI", "A3=0 B3=0 C3=1", "TOFRAME", "G63 Z1 F1"] {
         let result = run(text);
         assert_eq!(result.alarm().code, "E0202", "{text}");
         assert!(result.alarm().message.contains("not built"), "{text}: {}", result.alarm().message);

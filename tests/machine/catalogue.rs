@@ -21,6 +21,16 @@ fn validate(schema: &Value, root: &Value, value: &Value, path: &str, faults: &mu
         let branch = if not_met.is_empty() { "then" } else { "else" };
         validate(&schema[branch], root, value, path, faults);
     }
+    if let Some(options) = schema["oneOf"].as_array() {
+        let fits = |option: &&Value| {
+            let mut not_met = Vec::new();
+            validate(option, root, value, path, &mut not_met);
+            not_met.is_empty()
+        };
+        if options.iter().filter(fits).count() != 1 {
+            faults.push(format!("{path}: not one of {options:?}"));
+        }
+    }
     let mut fault = |text: String| faults.push(format!("{path}: {text}"));
     for (key, wanted) in
         [("enum", schema["enum"].as_array().cloned()), ("const", schema.get("const").map(|c| vec![c.clone()]))]
@@ -90,6 +100,8 @@ fn the_schema_accepts_every_good_file() {
 fn the_schema_finds_what_the_check_finds() {
     let broken = [
         ("pitch_mm = 12.0", "ptich_mm = 12.0"),
+        ("pitch_mm = 12.0 ", "# "),
+        ("pitch_mm = 12.0 ", "pitch_mm = 12.0\npinion_diameter_mm = 80.0 "),
         ("jerk_max_m_s3 = 15.0", "jerk_max_m_s3 = -15.0"),
         ("velocity_max_m_min = 20.0", "velocity_max_rpm = 20.0"),
         ("[axes.X.motor]", "[axes.X.moto]"),

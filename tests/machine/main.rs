@@ -2,7 +2,10 @@
 
 mod catalogue;
 mod drives;
+mod listing;
 mod overrides;
+#[path = "../random/mod.rs"]
+mod random;
 mod rejected;
 mod shipped;
 

@@ -196,7 +196,9 @@ fn our_reader_gives_what_the_mcap_crate_gives() {
             Content::Path(path) => assert_eq!(**path, Path::decode(&theirs.data[..]).unwrap()),
             Content::Event(event) => assert_eq!(event.kind.as_deref(), Some("block_start")),
             Content::Pose(_, pose) => assert_eq!(**pose, PoseInFrame::decode(&theirs.data[..]).unwrap()),
-            Content::Programmed(_) | Content::Sample(_) | Content::Other(_) => panic!("{}", topic.name),
+            Content::Spindle(_) | Content::Programmed(_) | Content::Sample(_) | Content::Other(_) => {
+                panic!("{}", topic.name)
+            }
         }
     }
 }

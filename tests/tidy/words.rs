@@ -26,7 +26,14 @@ const KEYS_WITHOUT_UNIT: [&str; 13] = [
 const NAMES_WITHOUT_UNIT: [&str; 6] = ["u", "factor", "ratio", "share", "direction", "quaternion_xyzw"];
 /// Rooms at a border, and names that are fine there: the unit comes from what stands beside the number (an NC word and the modes
 /// that are active, a key of the machine file, a field of the schema).
-const NAMES_AT_BORDERS: [(&[&str], &[&str]); 4] = [
+const NAMES_AT_BORDERS: [(&[&str], &[&str]); 6] = [
+    // An estimate of any key of the machine file: its unit stands beside it.
+    (&["identify"], &["value", "low", "high", "friction_points"]),
+    // Gains and errors of any axis: the gain, the axis and the objective say their unit.
+    (
+        &["tune"],
+        &["value", "values", "before", "low", "high", "rms", "peak", "mean_square", "inside", "range", "of", "heights"],
+    ),
     // A signal of a trace has its unit beside it, as text.
     (&["trace", "compare", "report"], &["value", "values", "limit", "offset"]),
     // Figures of any signal: the unit of the signal stands beside them.

@@ -121,7 +121,7 @@ fn eligible(block: &Held, rules: &Rules) -> Option<Chords> {
         Curve::Arc(_) | Curve::SpatialArc(_) => settings.compressor_blocks.arcs(),
         _ => false,
     };
-    if !(asked && short && kind) || block.curve.rotary_only() {
+    if !(asked && short && kind) || block.curve.rotary_only() || modes.thread.is_some() {
         return None;
     }
     Chords::new(&block.curve, &rules.own_tolerances(modes, &block.head.feed), rules.linear())

@@ -1,0 +1,31 @@
+//! Traces of an axis -> the parameters of its drive, each with a 95 % interval, or the reason why the trace cannot tell it.
+//!
+//! In: traces of any known format ([`Trace`](crate::trace::Trace)), the machine with what is taken as known (torque constant, transmission, cycles). Out:
+//! [`AxisResult`]s: [`Estimate`]s and [`Refusal`]s, keyed like the machine file. What a trace must hold, the method and its formulas stand in
+//! docs/identify.md, in the order of the files here: `record` reads one axis of a trace, `motion` filters it without a shift in time,
+//! `normal` solves least squares in blocks (intervals from leaving blocks out), `friction` and `staged` fit the mechanics, `aliasing`
+//! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` writes the programs to record. `profile` and `control`
+//! calibrate the control: corner smoothing and time law from the set-points of a program.
+//! Does not tune anything, and takes nothing from a machine file that it says it has identified.
+
+mod aliasing;
+mod axis;
+mod control;
+mod feedforward;
+mod friction;
+mod motion;
+mod normal;
+mod plan;
+mod profile;
+mod record;
+mod refine;
+mod speed_loop;
+mod staged;
+mod wire;
+mod write;
+
+pub use axis::{IdentifyOptions, identify};
+pub use control::{Agreement, ControlEstimate, ControlResult, TracedProgram, calibrate};
+pub use plan::{PLANNED_SIGNALS, PlannedProgram, PlannedSignal, plan};
+pub use wire::{AxisResult, Estimate, Figure, Means, Parameter, Refusal, TorqueSource};
+pub use write::machine_text;

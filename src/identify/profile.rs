@@ -1,0 +1,152 @@
+//! A motion along its path: where, and when, at equal shares of the path.
+//!
+//! In: set-points of a trace, or of a program planned here. Out: [`PathProfile`]: positions, times and mean feeds on [`CELLS`] stretches of
+//! equal length, standstill in front and behind left out. Two motions along nearly the same path are held against each other stretch by
+//! stretch, however different their times are. Does not fit.
+
+use crate::base::{AxisId, AxisKind};
+use crate::interpreter::Setup;
+use crate::kernel::{Kernel, Status};
+use crate::machine::Machine;
+use crate::trace::{Clock, Method, Signal, Trace};
+use std::sync::Arc;
+
+/// Stretches of a path.
+pub(super) const CELLS: usize = 3000;
+/// Set-points at most: five hours at 1 ms.
+const SETPOINTS_MAX: usize = 20_000_000;
+/// A step below this is standstill.
+const STEP_MIN_MM: f64 = 1e-7;
+
+/// A motion on equal stretches of its path.
+#[derive(Clone, Debug)]
+pub(super) struct PathProfile {
+    /// Positions of the linear axes at the borders of the stretches, `CELLS + 1`.
+    pub(super) places_mm: Vec<Vec<f64>>,
+    /// Mean feed in each stretch.
+    pub(super) feeds_mm_s: Vec<f64>,
+    /// Length of the path.
+    pub(super) length_mm: f64,
+    /// From the first to the last motion.
+    pub(super) time_s: f64,
+    /// Mean programmed feed of the motion; 0 where it is not known.
+    pub(super) programmed_mm_s: f64,
+}
+
+/// Linear axes that both the machine and the trace have.
+pub(super) fn shared_axes(trace: &Trace, machine: &Machine) -> Vec<AxisId> {
+    let has = |id: &AxisId| {
+        let axis = machine.axis(*id);
+        axis.kind == AxisKind::Linear && trace.axis_signal(&axis.name, "position_setpoint").is_some_and(|s| s.len() > 1)
+    };
+    machine.axis_ids().filter(has).collect()
+}
+
+impl PathProfile {
+    /// Of the set-points of a trace; `None` without motion or with gaps.
+    pub(super) fn of_trace(trace: &Trace, machine: &Machine, axes: &[AxisId]) -> Option<Self> {
+        let signals: Option<Vec<&Signal>> =
+            axes.iter().map(|id| trace.axis_signal(&machine.axis(*id).name, "position_setpoint")).collect();
+        let signals = signals?;
+        let grid = &signals.first()?.times;
+        let (start_s, end_s, period_s) = (grid.start_s()?, grid.end_s()?, grid.period_s()?);
+        let rows = ((end_s - start_s) / period_s).round();
+        if !(1.0..SETPOINTS_MAX as f64).contains(&rows) {
+            return None;
+        }
+        let times: Vec<f64> = (0..=rows as usize).map(|k| start_s + k as f64 * period_s).collect();
+        let column = |signal: &&Signal| {
+            let method = if signal.clock == Clock::Servo { Method::Hold } else { Method::Linear };
+            signal.resampled(&times, method)
+        };
+        let columns: Vec<Vec<f64>> = signals.iter().map(column).collect();
+        let places: Vec<Vec<f64>> =
+            (0..times.len()).map(|k| columns.iter().map(|column| column[k]).collect()).collect();
+        let complete = places.iter().flatten().all(|value| value.is_finite());
+        complete.then(|| Self::of(&places, period_s, 0.0)).flatten()
+    }
+
+    /// Of a program as this machine plans it; `None` after an alarm.
+    pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId]) -> Option<Self> {
+        let mut kernel = Kernel::new(machine.clone(), setup.clone(), false);
+        let period_s = machine.cycle.time_base.seconds(machine.cycle.time_base.ticks_per_setpoint());
+        let mut places = Vec::new();
+        let (mut feed_sum, mut feed_count) = (0.0, 0.0_f64);
+        loop {
+            let status = kernel.cycle().ok()?;
+            if let Some(setpoint) = kernel.output().setpoint {
+                places.push(axes.iter().map(|id| setpoint.axes[*id].position_lu).collect());
+                if let (Some(feed), false) = (setpoint.path.programmed_feed_lu_s, setpoint.path.rotary_only) {
+                    feed_sum += feed;
+                    feed_count += 1.0;
+                }
+            }
+            if status == Status::Finished {
+                break;
+            }
+            if places.len() > SETPOINTS_MAX {
+                return None;
+            }
+        }
+        Self::of(&places, period_s, feed_sum / feed_count.max(1.0))
+    }
+
+    fn of(places: &[Vec<f64>], period_s: f64, programmed_mm_s: f64) -> Option<Self> {
+        let step = |pair: &[Vec<f64>]| pair[0].iter().zip(&pair[1]).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt();
+        let steps: Vec<f64> = places.windows(2).map(step).collect();
+        let first = steps.iter().position(|step| *step > STEP_MIN_MM)?;
+        let last = steps.iter().rposition(|step| *step > STEP_MIN_MM)?;
+        let mut lengths = vec![0.0];
+        for step in &steps[first..=last] {
+            lengths.push(lengths[lengths.len() - 1] + step);
+        }
+        let length_mm = lengths[lengths.len() - 1];
+        let places = &places[first..=last + 1];
+        let (mut borders, mut times) = (Vec::with_capacity(CELLS + 1), Vec::with_capacity(CELLS + 1));
+        let mut at = 0;
+        for cell in 0..=CELLS {
+            let wanted = length_mm * cell as f64 / CELLS as f64;
+            // The last sample that has come no further: a standstill belongs to the stretch behind it.
+            while at + 2 < lengths.len() && lengths[at + 1] < wanted {
+                at += 1;
+            }
+            let way = lengths[at + 1] - lengths[at];
+            let share = if way > 0.0 { ((wanted - lengths[at]) / way).clamp(0.0, 1.0) } else { 0.0 };
+            times.push((at as f64 + share) * period_s);
+            borders.push(places[at].iter().zip(&places[at + 1]).map(|(a, b)| a + share * (b - a)).collect());
+        }
+        let cell_mm = length_mm / CELLS as f64;
+        let feeds_mm_s = times.windows(2).map(|pair| cell_mm / (pair[1] - pair[0]).max(1e-9)).collect();
+        let time_s = (last + 1 - first) as f64 * period_s;
+        Some(Self { places_mm: borders, feeds_mm_s, length_mm, time_s, programmed_mm_s })
+    }
+
+    /// Sideways distances from `reference` at equal shares of the path, one vector a border.
+    pub(super) fn sideways_mm(&self, reference: &Self) -> Vec<f64> {
+        let mut all = Vec::with_capacity(self.places_mm.len() * 3);
+        let shift: Vec<f64> = reference.places_mm[0].iter().zip(&self.places_mm[0]).map(|(a, b)| a - b).collect();
+        for cell in 0..=CELLS {
+            let (before, after) = (cell.saturating_sub(1), (cell + 1).min(CELLS));
+            let tangent: Vec<f64> =
+                reference.places_mm[after].iter().zip(&reference.places_mm[before]).map(|(b, a)| b - a).collect();
+            let size = tangent.iter().map(|t| t * t).sum::<f64>().sqrt().max(1e-12);
+            let own = self.places_mm[cell].iter().zip(&shift).map(|(place, shift)| place + shift);
+            let off: Vec<f64> = own.zip(&reference.places_mm[cell]).map(|(a, b)| a - b).collect();
+            let along = off.iter().zip(&tangent).map(|(d, t)| d * t / size).sum::<f64>();
+            all.extend(off.iter().zip(&tangent).map(|(d, t)| d - along * t / size));
+        }
+        all
+    }
+
+    /// RMS of the differences of feed over the path.
+    pub(super) fn feed_rms_mm_s(&self, reference: &Self) -> f64 {
+        let square: f64 = self.feeds_mm_s.iter().zip(&reference.feeds_mm_s).map(|(a, b)| (a - b).powi(2)).sum();
+        (square / CELLS as f64).sqrt()
+    }
+
+    /// RMS of the sideways distances.
+    pub(super) fn sideways_rms_mm(&self, reference: &Self) -> f64 {
+        let square: f64 = self.sideways_mm(reference).iter().map(|off| off * off).sum();
+        (square / (CELLS + 1) as f64).sqrt()
+    }
+}

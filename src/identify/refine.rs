@@ -1,0 +1,366 @@
+//! The simulated axis itself, fitted to the trace: output-error refinement.
+//!
+//! In: records with set-points, the drive with everything known about its controllers, the values of least squares. Out: better values, or
+//! `None` with a verdict why not. Gauss-Newton with damping on torque and position at the ticks:
+//!
+//! ```text
+//! r = [(τ - τ_sim)/σ_τ, (x - x_sim - zero)/σ_x]        J, B, Tc, g0 and, if no trace told them, Kp and Tn are free
+//! ```
+//! both behind the window of `motion`.
+//! The quantum of the scale is in the model, derivatives are differences over 2 % (a smaller step only sees which quantum is hit), and kvff and
+//! d_pos are never free together: both come from the recorded wires or from the machine file. Where the simulated axis leaves clearly more
+//! over than the law of `friction`, its controllers are not those of the machine, and least squares stay.
+
+use super::friction::Mechanics;
+use super::motion::{filtered, half_window_rows, window};
+use super::normal::{Blocks, Solution};
+use super::record::AxisRecord;
+use super::wire::{AxisResult, Estimate, Means, Parameter, TorqueSource};
+use crate::base::TimeBase;
+use crate::base::units::percent_from_ratio;
+use crate::drive::{AxisDrive, DriveInput, Start};
+use crate::machine::{Axis, DriveData, Machine};
+
+/// Relative step of the differences.
+const STEP_SHARE: f64 = 0.02;
+/// Passes at most.
+const PASSES: usize = 8;
+/// Rows of all records at most: a minute at 1 ms.
+const ROWS_MAX: usize = 60_000;
+/// The simulated axis may leave this much more over than the law does.
+const LEFT_OVER_RATIO: f64 = 1.25;
+/// Share of the torque that may be left over besides: sampling and rounding.
+const LEFT_OVER_SHARE: f64 = 0.005;
+/// What hitting other quanta than the axis did makes of a value: found on 20 repetitions of a synthetic trace.
+const GRAIN_SHARE: f64 = 5e-3;
+/// Interval of a gain of the speed loop, as a share of it, up to which it is told.
+const GAIN_SHARE: f64 = 0.2;
+/// A block.
+const BLOCK_S: f64 = 0.25;
+/// Rest in front of a motion that a simulation can start from.
+const REST_S: f64 = 0.01;
+
+/// What is fitted.
+struct Problem<'a> {
+    records: &'a [AxisRecord],
+    axis: &'a Axis,
+    data: DriveData,
+    time_base: &'a TimeBase,
+    free: Vec<Parameter>,
+}
+
+/// Residuals of one record: torque in N m, position in lu.
+struct Residuals {
+    torque: Vec<f64>,
+    position: Vec<f64>,
+}
+
+/// The refined values, or `None`.
+pub(super) fn refine(
+    records: &[AxisRecord],
+    machine: &Machine,
+    axis: &Axis,
+    known: &DriveData,
+    start: &Mechanics,
+    result: &mut AxisResult,
+) -> Option<Vec<Estimate>> {
+    if let Some(reason) = unfit(records, machine, known, start) {
+        if !start.estimates.is_empty() {
+            result.verdicts.push(format!("no output-error refinement: {reason}"));
+        }
+        return None;
+    }
+    let free = free_parameters(result, start);
+    let mut data = known.clone();
+    set(&mut data, &start.estimates.iter().map(|e| (e.parameter, e.value)).collect::<Vec<_>>());
+    if let Some(quantum) = records.iter().find_map(|record| quantum(record.position_lu.as_ref()?)) {
+        data.encoder.position_resolution_lu = quantum;
+    }
+    let mut problem = Problem { records, axis, data, time_base: &machine.cycle.time_base, free };
+    let (solution, left_n_m) = problem.solve()?;
+    let torque_rms_n_m = problem.torque_rms();
+    if left_n_m > LEFT_OVER_RATIO * start.rms_n_m + LEFT_OVER_SHARE * torque_rms_n_m {
+        let percent = percent_from_ratio(left_n_m / torque_rms_n_m);
+        let law_percent = percent_from_ratio(start.rms_n_m / torque_rms_n_m);
+        result.verdicts.push(format!(
+            "the simulated axis leaves {percent:.1} % of the torque over, the law of friction and inertia {law_percent:.1} %: \
+             its controllers are not quite those of this machine, and the values of least squares stay"
+        ));
+        return None;
+    }
+    result.verdicts.push(format!(
+        "the simulated axis follows the trace: {:.2} % of the torque is left over",
+        percent_from_ratio(left_n_m / torque_rms_n_m)
+    ));
+    Some(problem.estimates(&solution, start, result))
+}
+
+/// Why no simulation can be held against these traces.
+fn unfit(records: &[AxisRecord], machine: &Machine, data: &DriveData, start: &Mechanics) -> Option<&'static str> {
+    let cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
+    if start.value(Parameter::Inertia).is_none() || start.value(Parameter::Coulomb).is_none() {
+        return Some("inertia or Coulomb friction is missing to start from");
+    }
+    if start.misfit {
+        return Some(
+            "the trace does not follow the model of a rigid axis with Coulomb and viscous friction closely enough",
+        );
+    }
+    if records
+        .iter()
+        .any(|record| record.setpoint_lu.is_none() || record.position_lu.is_none() || record.torque.is_none())
+    {
+        return Some("set-point, position and torque are not in every trace");
+    }
+    if records.iter().any(|record| (record.period_s / cycle_s - 1.0).abs() > 1e-3) {
+        return Some("the trace is not at the position cycle");
+    }
+    if records.iter().map(|record| record.count).sum::<usize>() > ROWS_MAX {
+        return Some("the traces are longer than a minute at 1 ms");
+    }
+    let rests = |record: &AxisRecord| {
+        let rows = ((REST_S / record.period_s) as usize).max(2);
+        let setpoint = record.setpoint_lu.as_deref().unwrap_or(&[]);
+        let complete = setpoint.iter().all(|value| value.is_finite());
+        complete && setpoint.iter().take(rows).all(|value| (value - setpoint[0]).abs() < 1e-9)
+    };
+    if !records.iter().all(rests) {
+        return Some("a trace does not begin at rest, or has gaps: the simulation would start in another state");
+    }
+    None
+}
+
+fn free_parameters(result: &AxisResult, start: &Mechanics) -> Vec<Parameter> {
+    let mut free = vec![Parameter::Inertia, Parameter::Coulomb];
+    for parameter in [Parameter::Viscous, Parameter::Gravity] {
+        if start.value(parameter).is_some() {
+            free.push(parameter);
+        }
+    }
+    // No trace as fast as the speed loop: the motion may tell its gains.
+    if result.refusal(Parameter::SpeedGain).is_some() {
+        free.extend([Parameter::SpeedGain, Parameter::SpeedResetTime]);
+    }
+    free
+}
+
+fn get(data: &DriveData, parameter: Parameter) -> f64 {
+    match parameter {
+        Parameter::Inertia => data.mechanics.inertia_kg_m2,
+        Parameter::Viscous => data.mechanics.viscous_friction_n_m_s_per_rad,
+        Parameter::Coulomb => data.mechanics.coulomb_friction_n_m,
+        Parameter::Gravity => data.mechanics.gravity_n_m,
+        Parameter::SpeedGain => data.speed_gain_n_m_s_per_rad,
+        _ => data.speed_reset_time_s,
+    }
+}
+
+fn set(data: &mut DriveData, values: &[(Parameter, f64)]) {
+    for (parameter, value) in values {
+        match parameter {
+            Parameter::Inertia => data.mechanics.inertia_kg_m2 = value.max(1e-9),
+            Parameter::Viscous => data.mechanics.viscous_friction_n_m_s_per_rad = value.max(0.0),
+            Parameter::Coulomb => {
+                let above_n_m = data.mechanics.breakaway_friction_n_m - data.mechanics.coulomb_friction_n_m;
+                data.mechanics.coulomb_friction_n_m = value.max(0.0);
+                data.mechanics.breakaway_friction_n_m = value.max(0.0) + above_n_m.max(0.0);
+            }
+            Parameter::Gravity => data.mechanics.gravity_n_m = *value,
+            Parameter::GravitySin => data.mechanics.gravity_sin_n_m = *value,
+            Parameter::GravityCos => data.mechanics.gravity_cos_n_m = *value,
+            Parameter::SpeedGain => data.speed_gain_n_m_s_per_rad = value.max(1e-9),
+            Parameter::SpeedResetTime => data.speed_reset_time_s = value.max(1e-6),
+            _ => {}
+        }
+    }
+}
+
+/// The step of a scale, if the positions stand on one.
+fn quantum(position: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = position.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|s| *s > 1e-9).collect();
+    steps.sort_by(f64::total_cmp);
+    let least = *steps.get(steps.len() / 100)?;
+    let near =
+        |step: &&f64| ((**step / least) - (**step / least).round()).abs() < 0.01 * (**step / least).max(1.0).sqrt();
+    let whole = steps.iter().filter(|step| **step < 50.0 * least).filter(near).count();
+    let looked_at = steps.iter().filter(|step| **step < 50.0 * least).count();
+    (looked_at > 20 && whole as f64 > 0.98 * looked_at as f64 && least > 1e-7).then_some(least)
+}
+
+impl Problem<'_> {
+    /// Simulates all records; `None` where the axis leaves all bounds.
+    fn residuals(&self, data: &DriveData) -> Option<Vec<Residuals>> {
+        let axis = Axis { drive: Some(data.clone()), ..self.axis.clone() };
+        let kt = data.motor.torque_constant_n_m_per_a;
+        let mut all = Vec::new();
+        for record in self.records {
+            let (setpoint, position, torque) =
+                (record.setpoint_lu.as_ref()?, record.position_lu.as_ref()?, record.torque.as_ref()?);
+            let mut drive = AxisDrive::new(&axis, self.time_base, Start::Held, *setpoint.first()?)?;
+            let mut residuals = Residuals { torque: Vec::with_capacity(record.count), position: Vec::new() };
+            for (k, value) in setpoint.iter().enumerate() {
+                let input = DriveInput { position_setpoint_lu: *value, load_n_m: 0.0, feedforward_active: true };
+                let signals = drive.step(input);
+                let simulated = match torque.source {
+                    TorqueSource::MeanCurrent | TorqueSource::FineCurrent => kt * signals.current_mean_a,
+                    TorqueSource::Current => kt * signals.current_a,
+                    TorqueSource::TorqueReference => signals.torque_reference_n_m,
+                };
+                residuals.torque.push(torque.values_n_m.get(k)? - simulated);
+                residuals.position.push(position.get(k)? - signals.position_measured_lu);
+            }
+            if !drive.is_finite() {
+                return None;
+            }
+            // The zero of an encoder means nothing.
+            let finite: Vec<f64> = residuals.position.iter().copied().filter(|value| value.is_finite()).collect();
+            let zero = finite.iter().sum::<f64>() / finite.len().max(1) as f64;
+            residuals.position.iter_mut().for_each(|value| *value -= zero);
+            // The quanta of trace and simulation are not hit at the same instants: what that does is faster than the window.
+            let window = window(half_window_rows(record.period_s));
+            residuals.torque = filtered(&residuals.torque, &window);
+            residuals.position = filtered(&residuals.position, &window);
+            all.push(residuals);
+        }
+        Some(all)
+    }
+
+    /// RMS of torque and position.
+    fn sizes(&self, residuals: &[Residuals]) -> (f64, f64) {
+        let rms = |of: fn(&Residuals) -> &Vec<f64>| {
+            let values = || residuals.iter().flat_map(of).filter(|value| value.is_finite());
+            (values().map(|value| value * value).sum::<f64>() / values().count().max(1) as f64).sqrt()
+        };
+        (rms(|r| &r.torque).max(1e-12), rms(|r| &r.position).max(1e-12))
+    }
+
+    fn torque_rms(&self) -> f64 {
+        let torques =
+            || self.records.iter().filter_map(|record| record.torque.as_ref()).flat_map(|torque| &torque.values_n_m);
+        let finite = || torques().filter(|value| value.is_finite());
+        (finite().map(|value| value * value).sum::<f64>() / finite().count().max(1) as f64).sqrt()
+    }
+
+    /// Normal equations at the present values.
+    fn linearised(&self, base: &[Residuals], sizes: (f64, f64)) -> Option<Blocks> {
+        let mut columns = Vec::new();
+        for parameter in &self.free {
+            let value = get(&self.data, *parameter);
+            let floor = match parameter {
+                Parameter::Gravity | Parameter::Viscous => STEP_SHARE * self.small(*parameter),
+                _ => 0.0,
+            };
+            let step = (STEP_SHARE * value.abs()).max(floor);
+            let mut moved = self.data.clone();
+            set(&mut moved, &[(*parameter, value + step)]);
+            columns.push((step, self.residuals(&moved)?));
+        }
+        let mut blocks = Blocks::new(self.free.len());
+        for (place, record) in self.records.iter().enumerate() {
+            let per_block = ((BLOCK_S / record.period_s).round() as usize).max(1);
+            for k in 0..record.count {
+                let mut push = |of: fn(&Residuals) -> &Vec<f64>, size: f64| {
+                    let y = of(&base[place])[k] / size;
+                    let slope = |(step, moved): &(f64, Vec<Residuals>)| {
+                        (of(&base[place])[k] - of(&moved[place])[k]) / step / size
+                    };
+                    let row: Vec<f64> = columns.iter().map(slope).collect();
+                    if y.is_finite() && row.iter().all(|value| value.is_finite()) {
+                        blocks.push_in(k / per_block, &row, y);
+                    }
+                };
+                push(|r| &r.torque, sizes.0);
+                push(|r| &r.position, sizes.1);
+            }
+            blocks.close();
+        }
+        Some(blocks)
+    }
+
+    /// A size of a parameter that may be 0: what makes a torque like that of the dry friction.
+    fn small(&self, parameter: Parameter) -> f64 {
+        let coulomb = self.data.mechanics.coulomb_friction_n_m.max(1e-6);
+        if parameter == Parameter::Gravity { coulomb } else { coulomb / 100.0 }
+    }
+
+    /// Passes until nothing changes; the last linearisation and the torque left over.
+    fn solve(&mut self) -> Option<(Solution, f64)> {
+        let mut base = self.residuals(&self.data)?;
+        let sizes = self.sizes(&base);
+        let cost = |residuals: &[Residuals]| -> f64 {
+            let square = |values: &[f64], size: f64| {
+                values.iter().filter(|v| v.is_finite()).map(|v| (v / size).powi(2)).sum::<f64>()
+            };
+            residuals.iter().map(|r| square(&r.torque, sizes.0) + square(&r.position, sizes.1)).sum()
+        };
+        let columns: Vec<usize> = (0..self.free.len()).collect();
+        let mut last = self.linearised(&base, sizes)?.solve(&columns)?;
+        for _ in 0..PASSES {
+            let before = cost(&base);
+            let mut share = 1.0;
+            let mut moved = None;
+            // Half the step until it helps.
+            while moved.is_none() && share > 0.05 {
+                let mut data = self.data.clone();
+                let values: Vec<(Parameter, f64)> = self
+                    .free
+                    .iter()
+                    .enumerate()
+                    .map(|(j, p)| (*p, get(&self.data, *p) + share * last.theta[j]))
+                    .collect();
+                let possible = values
+                    .iter()
+                    .all(|(p, value)| matches!(p, Parameter::Gravity | Parameter::Viscous) || *value > 0.0);
+                set(&mut data, &values);
+                moved =
+                    possible.then(|| self.residuals(&data)).flatten().filter(|r| cost(r) < before).map(|r| (data, r));
+                share /= 2.0;
+            }
+            let Some((data, residuals)) = moved else { break };
+            (self.data, base) = (data, residuals);
+            last = self.linearised(&base, sizes)?.solve(&columns)?;
+            if before - cost(&base) < 1e-4 * before {
+                break;
+            }
+        }
+        // Weights are those of the final residuals: the interval belongs to them.
+        let sizes = self.sizes(&base);
+        let solution = self.linearised(&base, sizes)?.solve(&columns)?;
+        Some((solution, sizes.0))
+    }
+
+    fn estimates(&self, solution: &Solution, start: &Mechanics, result: &mut AxisResult) -> Vec<Estimate> {
+        let mut found = Vec::new();
+        for (j, parameter) in self.free.iter().enumerate() {
+            let (_, noise) = solution.value(j);
+            let value = get(&self.data, *parameter);
+            let first = start.estimates.iter().find(|estimate| estimate.parameter == *parameter);
+            // What the last pass would still change, and the grain of the differences, belong to the interval.
+            // Gravity may be 0: dry friction is the size of it.
+            let size = if *parameter == Parameter::Gravity { self.data.mechanics.coulomb_friction_n_m } else { value };
+            let half = noise.hypot(GRAIN_SHARE * size) + solution.theta[j].abs();
+            let estimate = Estimate::around(*parameter, value, half, Means::OutputError);
+            match (parameter, first) {
+                (_, Some(first)) if half > first.half() => found.push(*first),
+                (Parameter::SpeedGain | Parameter::SpeedResetTime, _) => {
+                    if half <= GAIN_SHARE * value {
+                        found.push(estimate);
+                    } else {
+                        let percent = percent_from_ratio(half / value);
+                        let remedy =
+                            "record speed set-point, speed and torque set-point of the drive at its speed cycle";
+                        result.refusals.retain(|refusal| refusal.parameter != *parameter);
+                        result.refuse(*parameter, format!("the motion tells it to ±{percent:.0} % only"), remedy);
+                    }
+                }
+                _ => found.push(estimate),
+            }
+        }
+        for first in &start.estimates {
+            if found.iter().all(|estimate| estimate.parameter != first.parameter) {
+                found.push(*first);
+            }
+        }
+        found
+    }
+}

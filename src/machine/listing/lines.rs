@@ -1,0 +1,286 @@
+//! From text to assignments.
+//!
+//! In: files, archives taken apart. Out: [`Listing`]. Known lines: `N32300 $MA_MAX_AX_ACCEL[0,AX1]=6` with or without the number,
+//! `p1460[0]=5`, `CHANDATA(1)`, `INCH`, comments of ours; everything else is counted. A line that begins like an assignment and is none is
+//! an error with its place: a number that cannot be read must not be passed over. Values are not judged.
+
+use super::archive::{is_archive, members};
+use super::data::{Datum, DriveObject, Listing, Literal, Scope, Spot};
+use super::{CARRIED, ListingFile};
+use crate::base::Diagnostic;
+use std::sync::Arc;
+
+/// Bytes looked at to tell text from binary.
+const HEAD: usize = 4096;
+/// Longest line that a finding shows.
+const LINE_MAX: usize = 400;
+/// Findings shown at most: a file that is something else has thousands.
+const ERRORS_MAX: usize = 20;
+/// Most data of one import: an archive of a large control has some 30,000.
+const DATA_MAX: usize = 2_000_000;
+
+/// Reads all files.
+pub(super) fn read(files: &[ListingFile]) -> Result<Listing, Vec<Diagnostic>> {
+    let mut reader = Reader::default();
+    for file in files {
+        if is_archive(&file.bytes) {
+            let found = members(&file.name, &file.bytes).map_err(|finding| vec![finding])?;
+            for member in found.iter().filter(|member| of_interest(member.name)) {
+                let name = format!("{}/{}", file.name, member.name);
+                if is_text(member.bytes) {
+                    reader.text(&name, &decoded(member.bytes));
+                } else {
+                    reader.listing.binary.push(member.name.to_owned());
+                }
+            }
+        } else if is_text(&file.bytes) {
+            reader.text(&file.name, &decoded(&file.bytes));
+        } else {
+            return Err(vec![binary(file)]);
+        }
+    }
+    if !reader.errors.is_empty() {
+        return Err(reader.errors);
+    }
+    if reader.listing.is_empty() {
+        let names: Vec<String> = files.iter().map(|file| format!("`{}`", file.name)).collect();
+        let message = format!("{}: there are no machine data", names.join(", "));
+        let help =
+            "expected lines such as N32300 $MA_MAX_AX_ACCEL[0,AX1]=6 or p1460[0]=5, or an archive (@@MMCIBN) with them";
+        return Err(vec![Diagnostic::error("M0301", message).help(help)]);
+    }
+    Ok(reader.listing)
+}
+
+fn binary(file: &ListingFile) -> Diagnostic {
+    let (what, help) = if file.bytes.starts_with(b"PK\x03\x04") {
+        ("a zip file", "unpack it, and import the archive or the listing inside")
+    } else {
+        (
+            "binary, and no archive that begins with @@MMCIBN",
+            "save the machine data as text (ASCII): of the NC as INI or TEA, of the drives as ASCII archive",
+        )
+    };
+    Diagnostic::error("M0303", format!("`{}` is {what}", file.name)).help(help)
+}
+
+/// Members that may hold machine data; programs and cycles read them and do not set them.
+fn of_interest(name: &str) -> bool {
+    let upper = name.to_ascii_uppercase();
+    ["_INI", "_TEA", ".INI", ".TEA", "_TEX", "_ACX", ".ACX", "_TXT"].iter().any(|end| upper.ends_with(end))
+}
+
+fn is_text(bytes: &[u8]) -> bool {
+    !bytes.iter().take(HEAD).any(|byte| *byte == 0)
+}
+
+/// UTF-8, else Latin-1.
+fn decoded(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.trim_start_matches('\u{feff}').to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
+#[derive(Default)]
+struct Reader {
+    listing: Listing,
+    errors: Vec<Diagnostic>,
+    /// Of `CHANDATA`.
+    channel: u32,
+    count: usize,
+}
+
+/// A line that begins like an assignment and is none.
+struct Broken {
+    expected: &'static str,
+}
+
+impl Reader {
+    fn text(&mut self, name: &str, text: &str) {
+        self.channel = 1;
+        let file: Arc<str> = name.into();
+        self.listing.drives.push(DriveObject { file: name.to_owned(), ..DriveObject::default() });
+        for (number, line) in text.lines().enumerate() {
+            let shown: String = line.chars().take(LINE_MAX).collect();
+            let spot = Spot { file: file.clone(), line: number as u32 + 1, text: shown.trim_end().into() };
+            if let Err(broken) = self.line(line.trim(), &spot)
+                && self.errors.len() < ERRORS_MAX
+            {
+                let finding = Diagnostic::error("M0304", "an assignment of a machine datum that cannot be read");
+                self.errors.push(
+                    spot.mark(finding, broken.expected)
+                        .help("write it as the control does: N32300 $MA_MAX_AX_ACCEL[0,AX1]=6"),
+                );
+            }
+            if self.count > DATA_MAX {
+                let finding = Diagnostic::error("M0304", format!("more than {DATA_MAX} machine data"));
+                self.errors.push(spot.mark(finding, "").help("import fewer files at once"));
+                break;
+            }
+        }
+        self.listing.drives.retain(|drive| !drive.parameters.is_empty());
+    }
+
+    fn line(&mut self, line: &str, spot: &Spot) -> Result<(), Broken> {
+        if let Some(rest) = line.strip_prefix(CARRIED.trim_end()) {
+            return self.carried(rest.trim(), spot);
+        }
+        if line.is_empty() || line.starts_with([';', '%']) {
+            return Ok(());
+        }
+        if line.eq_ignore_ascii_case("INCH") {
+            self.listing.inch = Some(spot.clone());
+            return Ok(());
+        }
+        if let Some(rest) = line.strip_prefix("CHANDATA(") {
+            let digits = rest.trim_end_matches(')').trim();
+            self.channel = digits.parse().map_err(|_| Broken { expected: "expected CHANDATA(1)" })?;
+            return Ok(());
+        }
+        if let Some((number, rest)) = parameter(line) {
+            return self.parameter(number, rest, spot);
+        }
+        let (number, rest) = block_number(line);
+        if rest.starts_with('$') {
+            return self.datum(number, rest, spot);
+        }
+        if line.starts_with('[') {
+            // A header of a section: of a new drive, if it is one.
+            self.new_drive(None);
+        }
+        self.listing.other_lines += 1;
+        Ok(())
+    }
+
+    /// `drive X` opens the parameters of a drive, anything else is a key.
+    fn carried(&mut self, rest: &str, spot: &Spot) -> Result<(), Broken> {
+        if let Some(axis) = rest.strip_prefix("drive ") {
+            self.new_drive(Some(axis.trim().to_owned()));
+            return Ok(());
+        }
+        let (key, value) = rest.split_once('=').ok_or(Broken { expected: "expected KEY = VALUE" })?;
+        self.listing.carried.insert(key.trim().to_owned(), (value.trim().to_owned(), spot.clone()));
+        Ok(())
+    }
+
+    fn new_drive(&mut self, axis: Option<String>) {
+        let Some(last) = self.listing.drives.last_mut() else { return };
+        if last.parameters.is_empty() {
+            last.axis = axis.or(last.axis.take());
+        } else {
+            let file = last.file.clone();
+            self.listing.drives.push(DriveObject { file, axis, ..DriveObject::default() });
+        }
+    }
+
+    /// `[0]=5` behind `p1460`.
+    fn parameter(&mut self, number: u32, rest: &str, spot: &Spot) -> Result<(), Broken> {
+        let (index, rest) = match rest.strip_prefix('[') {
+            Some(rest) => {
+                let (index, rest) = rest.split_once(']').ok_or(Broken { expected: "expected p1460[0]=5" })?;
+                (index.trim().parse().map_err(|_| Broken { expected: "expected a number in the brackets" })?, rest)
+            }
+            None => (0, rest),
+        };
+        let value = rest.trim_start().strip_prefix('=').ok_or(Broken { expected: "expected =" })?;
+        // A connection (`722.0`, `0:0.0`) and a text are no numbers, and nothing asks for them.
+        let literal = literal(value).unwrap_or_else(|_| Literal::Text(value.trim().to_owned()));
+        self.count += 1;
+        if let Some(drive) = self.listing.drives.last_mut() {
+            drive.parameters.insert((number, index), Datum { literal, spot: spot.clone(), used: false });
+        }
+        Ok(())
+    }
+
+    fn datum(&mut self, number: Option<u32>, line: &str, spot: &Spot) -> Result<(), Broken> {
+        let end = line.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '$')).unwrap_or(line.len());
+        let (word, rest) = (line[..end].to_ascii_uppercase(), line[end..].trim_start());
+        let (inside, rest) = match rest.strip_prefix('[') {
+            Some(rest) => rest.split_once(']').ok_or(Broken { expected: "expected ]" })?,
+            None => ("", rest),
+        };
+        let rest = rest.trim_start();
+        self.count += 1;
+        let scope = [Scope::General, Scope::Channel, Scope::ChannelSetting, Scope::Axis]
+            .into_iter()
+            .find(|scope| word.starts_with(scope.prefix()));
+        let foreign_channel = matches!(scope, Some(Scope::Channel | Scope::ChannelSetting)) && self.channel != 1;
+        let Some(scope) = scope.filter(|_| !foreign_channel) else {
+            let shown = match foreign_channel {
+                true => format!("{word} of channel {}", self.channel),
+                false => word,
+            };
+            *self.listing.foreign.entry(shown).or_default() += 1;
+            return Ok(());
+        };
+        let value = rest.strip_prefix('=').ok_or(Broken { expected: "expected =" })?;
+        let (axis, index) = address(inside, scope)?;
+        let name = word[scope.prefix().len()..].to_owned();
+        let datum = Datum { literal: literal(value)?, spot: spot.clone(), used: false };
+        self.listing.add(scope, &name, number, (axis, index), datum);
+        Ok(())
+    }
+}
+
+/// `0,AX1` or `AX1` or `0`; a second index is folded into the first, so that it is told apart.
+fn address(inside: &str, scope: Scope) -> Result<(String, u32), Broken> {
+    let (mut axis, mut index) = (String::new(), 0_u32);
+    for part in inside.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        if part.starts_with(|c: char| c.is_ascii_digit()) {
+            let given: u32 = part.parse().map_err(|_| Broken { expected: "expected an index" })?;
+            index = index.saturating_mul(1000).saturating_add(given);
+        } else {
+            axis = part.trim_matches('"').to_ascii_uppercase();
+        }
+    }
+    if scope == Scope::Axis && axis.is_empty() {
+        return Err(Broken { expected: "expected an axis, such as [0,AX1]" });
+    }
+    Ok((axis, index))
+}
+
+/// `6`, `1EX-5`, `'H2f'`, `'B101'`, `"X1"`, up to a comment.
+fn literal(value: &str) -> Result<Literal, Broken> {
+    let value = value.trim();
+    if let Some(text) = value.strip_prefix('"') {
+        let (text, _) = text.split_once('"').ok_or(Broken { expected: "expected a closing quote" })?;
+        return Ok(Literal::Text(text.to_owned()));
+    }
+    let value = value.split(';').next().unwrap_or(value).trim();
+    if let Some(coded) = value.strip_prefix('\'').and_then(|text| text.strip_suffix('\'')) {
+        let (radix, digits) = match coded.split_at_checked(1) {
+            Some(("H" | "h", digits)) => (16, digits),
+            Some(("B" | "b", digits)) => (2, digits),
+            _ => return Ok(Literal::Text(coded.to_owned())),
+        };
+        let number =
+            u64::from_str_radix(digits, radix).map_err(|_| Broken { expected: "expected digits after 'H or 'B" })?;
+        return Ok(Literal::Number(number as f64));
+    }
+    let plain = value.to_ascii_uppercase().replace("EX", "E").replace(' ', "");
+    match plain.parse::<f64>() {
+        Ok(number) if number.is_finite() && !plain.contains("INF") => Ok(Literal::Number(number)),
+        _ if matches!(plain.as_str(), "TRUE" | "FALSE") => Ok(Literal::Number(f64::from(u8::from(plain == "TRUE")))),
+        _ => Err(Broken { expected: "expected a number" }),
+    }
+}
+
+/// `N32300 rest`.
+fn block_number(line: &str) -> (Option<u32>, &str) {
+    let Some(rest) = line.strip_prefix(['N', 'n']) else { return (None, line) };
+    let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+    match rest[..digits].parse() {
+        Ok(number) => (Some(number), rest[digits..].trim_start()),
+        Err(_) => (None, line),
+    }
+}
+
+/// `p1460` and what follows; `r0107` is read likewise.
+fn parameter(line: &str) -> Option<(u32, &str)> {
+    let rest = line.strip_prefix(['p', 'r', 'P'])?;
+    let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+    let rest_after = &rest[digits..];
+    let follows = rest_after.trim_start().starts_with(['[', '=']);
+    (digits > 0 && follows).then(|| rest[..digits].parse().ok())?.map(|number| (number, rest_after))
+}

@@ -1,0 +1,225 @@
+//! What is driven: position set-points of all axes, at the position cycle of each.
+//!
+//! In: a program (through the kernel, without drives, once), or a trace with set-points and a measured error. Out: [`Course`]. Exact stops do
+//! not wait for the axes here: the set-points depend on no gain. Of a long program the first [`COURSE_MAX_S`] count.
+
+use crate::base::units::rad_from_deg;
+use crate::base::{AxisId, AxisKind, Diagnostic, MachinePoint, PerAxis};
+use crate::interpolator::{AxisSetpoint, FineInterpolator};
+use crate::interpreter::Setup;
+use crate::kernel::{Kernel, Status};
+use crate::machine::Machine;
+use crate::trace::{Method, Signal, Trace};
+use std::sync::Arc;
+
+/// Longest course: gains need reversals and accelerations, not hours.
+pub const COURSE_MAX_S: f64 = 120.0;
+
+/// Set-points of one program or trace.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// As the user named it.
+    pub name: String,
+    /// Never used for tuning.
+    pub validates: bool,
+    /// From a trace: its errors are measured ones.
+    pub measured: bool,
+    /// Time.
+    pub duration_s: f64,
+    /// What the program gave rise to.
+    pub warnings: Vec<Diagnostic>,
+    pub(super) axes: Vec<AxisCourse>,
+    /// Postures at t_s, of all axes of the machine.
+    pub(super) postures: Vec<MachinePoint>,
+    /// Feed-forward in the cycle that begins at each of them.
+    pub(super) active: Vec<bool>,
+}
+
+/// One axis of it.
+#[derive(Clone, Debug)]
+pub(super) struct AxisCourse {
+    pub axis: AxisId,
+    /// Position cycles in t_s.
+    pub steps: usize,
+    /// Set-points at the position cycle; the last one stands at the last posture.
+    pub positions_lu: Vec<f64>,
+    pub moves: bool,
+    /// Error of the trace, with the gains of the machine: control deviation, else set-point minus actual.
+    pub measured_lu: Option<Measured>,
+    /// Measured minus simulated, with the gains of the machine; the same for both errors.
+    pub offset_lu: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) enum Measured {
+    Deviation(Vec<f64>),
+    Following(Vec<f64>),
+}
+
+impl Course {
+    /// Its beginning, the whole if it is shorter.
+    pub fn beginning(mut self, duration_s: f64) -> Self {
+        let period_s = self.duration_s / (self.postures.len().max(2) - 1) as f64;
+        let rows = ((duration_s / period_s.max(f64::MIN_POSITIVE)) as usize).clamp(1, self.postures.len().max(1));
+        if rows < self.postures.len() {
+            self.postures.truncate(rows);
+            self.active.truncate(rows);
+            for axis in &mut self.axes {
+                axis.positions_lu.truncate((rows - 1) * axis.steps + 1);
+                axis.moves = axis.positions_lu.windows(2).any(|pair| pair[0] != pair[1]);
+                match &mut axis.measured_lu {
+                    Some(Measured::Deviation(values) | Measured::Following(values)) => {
+                        values.truncate(axis.positions_lu.len());
+                    }
+                    None => {}
+                }
+            }
+            self.duration_s = (rows - 1) as f64 * period_s;
+        }
+        self
+    }
+}
+
+/// Set-points of a program. Errors: the alarm that ends it.
+pub fn course_of_program(
+    name: &str,
+    setup: Setup,
+    machine: &Arc<Machine>,
+    validates: bool,
+    tell: &mut dyn FnMut(f64),
+) -> Result<Course, Diagnostic> {
+    let mut kernel = Kernel::new(machine.clone(), setup, false);
+    let mut sent: Vec<Vec<AxisSetpoint>> = vec![Vec::new(); machine.axes.len()];
+    let mut active = Vec::new();
+    let period_s = machine.cycle.time_base.setpoint_period_s();
+    while (active.len() as f64) * period_s < COURSE_MAX_S && kernel.cycle()? == Status::Running {
+        let output = kernel.output();
+        for row in &output.rows {
+            sent[row.axis.index()].push(row.setpoint);
+        }
+        active.push(output.setpoint.is_some_and(|setpoint| setpoint.feedforward_active));
+        if active.len().is_multiple_of(4096) {
+            tell(active.len() as f64 * period_s);
+        }
+    }
+    let findings = kernel.take_findings();
+    if let Some(alarm) = findings.alarm {
+        return Err(alarm);
+    }
+    let axes = machine
+        .axis_ids()
+        .filter_map(|axis| {
+            let data = machine.axis(axis).drive.as_ref()?;
+            let fine = FineInterpolator::new(machine, data.position_cycle_ticks);
+            let steps = fine.steps();
+            let mut positions_lu = Vec::with_capacity(active.len() * steps as usize);
+            for pair in sent[axis.index()].windows(2) {
+                positions_lu.extend((0..steps).map(|step| fine.at(&pair[0], &pair[1], step).position_lu));
+            }
+            positions_lu.extend(sent[axis.index()].last().map(|last| last.position_lu));
+            Some(axis_course(axis, steps as usize, positions_lu))
+        })
+        .collect();
+    let posture = |k: usize| {
+        MachinePoint(PerAxis::from_fn(|axis| {
+            sent.get(axis.index()).and_then(|of_axis| of_axis.get(k)).map_or(0.0, |setpoint| setpoint.position_lu)
+        }))
+    };
+    let postures: Vec<MachinePoint> = (0..active.len()).map(posture).collect();
+    Ok(Course {
+        name: name.to_owned(),
+        validates,
+        measured: false,
+        duration_s: postures.len().saturating_sub(1) as f64 * period_s,
+        warnings: findings.warnings,
+        axes,
+        postures,
+        active,
+    })
+}
+
+fn axis_course(axis: AxisId, steps: usize, positions_lu: Vec<f64>) -> AxisCourse {
+    let moves = positions_lu.windows(2).any(|pair| pair[0] != pair[1]);
+    AxisCourse { axis, steps, positions_lu, moves, measured_lu: None, offset_lu: Vec::new() }
+}
+
+/// Set-points and errors of a trace. Errors: signals that are missing, gaps.
+pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Result<Course, Diagnostic> {
+    let find = |axis: AxisId, stem: &str| -> Option<&Signal> {
+        trace.signal(&format!("{}.{stem}", machine.axis(axis).name)).filter(|signal| signal.len() > 1)
+    };
+    let found: Vec<(AxisId, &Signal)> =
+        machine.axis_ids().filter_map(|axis| Some((axis, find(axis, "position_setpoint")?))).collect();
+    let spans = || found.iter().map(|(_, signal)| (signal.times.time_s(0), signal.times.time_s(signal.len() - 1)));
+    let start_s = spans().map(|span| span.0).fold(f64::NEG_INFINITY, f64::max);
+    let end_s = spans().map(|span| span.1).fold(f64::INFINITY, f64::min);
+    let period_s = machine.cycle.time_base.setpoint_period_s();
+    let steps = ((end_s - start_s).min(COURSE_MAX_S) / period_s + 1e-6).floor();
+    if found.is_empty() || steps.is_nan() || steps < 1.0 {
+        let message =
+            format!("`{}` holds no position set-points of the axes of this machine in one stretch", trace.name);
+        let help = "record position set-point and control deviation (or actual position) of each axis; --axis-name 7=A names axes";
+        return Err(Diagnostic::error("U0001", message).help(help));
+    }
+    let mut axes = Vec::new();
+    for (axis, signal) in &found {
+        let Some(data) = machine.axis(*axis).drive.as_ref() else { continue };
+        let ratio = (machine.cycle.time_base.ticks_per_setpoint() / data.position_cycle_ticks.max(1)).max(1);
+        let cycle_s = period_s / ratio as f64;
+        let times: Vec<f64> = (0..=steps as usize * ratio as usize).map(|k| start_s + k as f64 * cycle_s).collect();
+        let mut course =
+            axis_course(*axis, ratio as usize, resampled(signal, &times, machine.axis(*axis).kind, &trace.name)?);
+        let of = |stem: &str| {
+            find(*axis, stem).map(|signal| resampled(signal, &times, machine.axis(*axis).kind, &trace.name))
+        };
+        course.measured_lu = match (of("control_deviation"), of("following_error"), of("position_actual")) {
+            (Some(deviation), ..) => Some(Measured::Deviation(deviation?)),
+            (None, Some(lag), _) => Some(Measured::Following(lag?)),
+            (None, None, Some(actual)) => {
+                let actual = actual?;
+                let lag = course.positions_lu.iter().zip(&actual).map(|(sent, actual)| sent - actual);
+                Some(Measured::Following(lag.collect()))
+            }
+            (None, None, None) => None,
+        };
+        if course.moves && course.measured_lu.is_none() {
+            let name = &machine.axis(*axis).name;
+            let message = format!("`{}` has set-points of {name}, and no error of it", trace.name);
+            let help = "record its control deviation, following error or actual position as well";
+            return Err(Diagnostic::error("U0001", message).help(help));
+        }
+        axes.push(course);
+    }
+    let rows = steps as usize + 1;
+    let posture = |k: usize| {
+        MachinePoint(PerAxis::from_fn(|axis| {
+            let of_axis = axes.iter().find(|course| course.axis == axis);
+            let home_lu = machine.axes.get(axis.index()).map_or(0.0, |axis| axis.home_lu);
+            of_axis.and_then(|course| course.positions_lu.get(k * course.steps).copied()).unwrap_or(home_lu)
+        }))
+    };
+    let postures = (0..rows).map(posture).collect();
+    let (name, active) = (trace.name.clone(), vec![true; rows]);
+    Ok(Course {
+        name,
+        validates,
+        measured: true,
+        duration_s: steps * period_s,
+        warnings: Vec::new(),
+        axes,
+        postures,
+        active,
+    })
+}
+
+fn resampled(signal: &Signal, times: &[f64], kind: AxisKind, name: &str) -> Result<Vec<f64>, Diagnostic> {
+    let mut values = signal.resampled(times, Method::Linear);
+    if let Some(row) = values.iter().position(|value| value.is_nan()) {
+        let message = format!("`{name}`: `{}` has a gap at {:.6} s", signal.original, times[row]);
+        return Err(Diagnostic::error("U0001", message).help("export a part without gaps"));
+    }
+    if kind == AxisKind::Rotary {
+        values.iter_mut().for_each(|value| *value = rad_from_deg(*value));
+    }
+    Ok(values)
+}

@@ -1,0 +1,462 @@
+//! Axes that are tuned together, and the whole of a tuning.
+//!
+//! In: machine, courses, options. Out: [`Tuned`]. Under the contour objective the axes that move the tool in one course are one group with one
+//! delay; else every axis is its own group. New gains are taken only if they are better on the courses for tuning by more than chance: a paired
+//! look at blocks of [`BLOCK_S`] decides, and 2 % (contour: 10 %) are the least, so that tuning does not chase single friction events.
+
+use super::contour::{Tool, moves_tool};
+use super::course::Course;
+use super::figures::{CourseFigures, Sensitivity, course_figures, sensitivities};
+use super::fit::{Certainty, certainty, gauss_newton};
+use super::gains::{Gain, Gains, range};
+use super::landscape::{Map, maps};
+use super::search::search;
+use super::simulate::{Job, calibrate, responses};
+use super::{Measure, Objective, TuneOptions};
+use crate::base::{AxisId, AxisKind, Diagnostic};
+use crate::machine::{DriveData, Machine};
+
+/// Residuals further apart than this count as independent of each other.
+pub(super) const BLOCK_S: f64 = 0.25;
+/// Improvement in standard errors of its mean over blocks that is not chance.
+const CERTAIN_ERRORS: f64 = 1.65;
+/// RMS after over before above which a change is not worth it: it is lost on the next program. Most of a contour error is what friction does at
+/// reversals: an improvement there of less than a tenth has made other programs worse.
+const WORTH_RATIO: f64 = 0.98;
+const WORTH_CONTOUR_RATIO: f64 = 0.9;
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Tuned {
+    /// In order of the machine.
+    pub axes: Vec<TunedAxis>,
+    /// Courses for tuning first, then those for validation.
+    pub courses: Vec<CourseFigures>,
+    /// ±10 %, one at a time.
+    pub sensitivities: Vec<Sensitivity>,
+    /// Maps around the optimum, if asked for.
+    pub landscapes: Vec<Landscape>,
+    /// What a person should know.
+    pub warnings: Vec<Diagnostic>,
+    /// Drives simulated over a course.
+    pub simulations: usize,
+}
+
+/// Gains of an axis.
+#[derive(Clone, Debug)]
+pub struct TunedAxis {
+    /// Which.
+    pub axis: AxisId,
+    /// Its name.
+    pub name: String,
+    /// Linear or rotary.
+    pub kind: AxisKind,
+    /// Each gain that was free.
+    pub gains: Vec<TunedGain>,
+    /// Axes that share the delay, this one included; one name without any.
+    pub together: Vec<String>,
+}
+
+/// One gain, in the unit of its key.
+#[derive(Clone, Debug)]
+pub struct TunedGain {
+    /// Which.
+    pub gain: Gain,
+    /// Before.
+    pub before: f64,
+    /// After.
+    pub value: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// It stands at a bound.
+    pub at_bound: bool,
+    /// The courses say something about it; else it is what theory or the machine says.
+    pub certain: bool,
+}
+
+/// A map with its axis.
+#[derive(Clone, Debug)]
+pub struct Landscape {
+    /// Name of the axis.
+    pub axis: String,
+    /// The map.
+    pub map: Map,
+}
+
+/// An axis of a group.
+pub(super) struct Member {
+    pub axis: AxisId,
+    pub data: DriveData,
+    pub ranges: Vec<(Gain, [f64; 2])>,
+}
+
+/// A number that is searched: a gain of one member, or of all.
+pub(super) struct Slot {
+    pub gain: Gain,
+    pub members: Vec<usize>,
+    pub range: [f64; 2],
+}
+
+/// Axes tuned together.
+pub(super) struct Group<'a> {
+    pub machine: &'a Machine,
+    pub courses: &'a [Course],
+    pub tool: &'a Tool,
+    /// Of every course.
+    pub paths_mm: &'a [Vec<[f64; 3]>],
+    pub members: Vec<Member>,
+    pub slots: Vec<Slot>,
+    pub objective: Objective,
+    pub measure: Measure,
+    pub simulations: std::sync::atomic::AtomicUsize,
+}
+
+/// How good a set of gains is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Score {
+    /// Mean of the courses.
+    pub mean_square: f64,
+    pub peak: f64,
+}
+
+/// Residuals of one candidate on one course: `components` numbers a tick.
+pub(super) struct Residual {
+    pub of: Vec<f64>,
+    pub components: usize,
+    pub period_s: f64,
+}
+
+impl Residual {
+    /// Sum of squares, number of ticks, largest amount.
+    pub fn figures(&self) -> (f64, usize, f64) {
+        let squares = self.of.chunks(self.components).map(|tick| tick.iter().map(|part| part * part).sum::<f64>());
+        let (sum, largest) = squares.fold((0.0, 0.0_f64), |(sum, largest), square| (sum + square, largest.max(square)));
+        (sum, self.of.len() / self.components, largest.sqrt())
+    }
+}
+
+impl Group<'_> {
+    /// Gains as the machine has them.
+    pub fn before(&self) -> Vec<Gains> {
+        self.members.iter().map(|member| Gains::of(&member.data)).collect()
+    }
+
+    /// Gains as theory has them, inside the bounds.
+    pub fn theory(&self) -> Vec<Gains> {
+        let time_base = &self.machine.cycle.time_base;
+        let mut all: Vec<Gains> = self
+            .members
+            .iter()
+            .map(|member| {
+                let free: Vec<Gain> = member.ranges.iter().map(|(gain, _)| *gain).collect();
+                let position_s = time_base.seconds(member.data.position_cycle_ticks);
+                let speed_s = time_base.seconds(member.data.speed_cycle_ticks);
+                Gains::of_theory(&member.data, position_s, speed_s, &free)
+            })
+            .collect();
+        for slot in &self.slots {
+            let mean =
+                slot.members.iter().map(|member| all[*member].get(slot.gain)).sum::<f64>() / slot.members.len() as f64;
+            self.put(&mut all, slot, mean);
+        }
+        all
+    }
+
+    /// The value of a slot.
+    pub fn value(&self, gains: &[Gains], slot: &Slot) -> f64 {
+        slot.members.first().map_or(0.0, |member| gains[*member].get(slot.gain))
+    }
+
+    /// Sets a slot, inside its bounds.
+    pub fn put(&self, gains: &mut [Gains], slot: &Slot, inside: f64) {
+        for member in &slot.members {
+            gains[*member] = gains[*member].with(slot.gain, inside.clamp(slot.range[0], slot.range[1]));
+        }
+    }
+
+    /// Residuals, `[course][candidate]`; data sets that several candidates share are simulated once.
+    pub fn residuals(&self, candidates: &[Vec<Gains>]) -> Vec<Vec<Residual>> {
+        let mut distinct: Vec<Vec<Gains>> = vec![Vec::new(); self.members.len()];
+        let mut places: Vec<Vec<usize>> = Vec::with_capacity(candidates.len());
+        for candidate in candidates {
+            let of_candidate = candidate.iter().enumerate().map(|(member, gains)| {
+                let known = &mut distinct[member];
+                known.iter().position(|other| other == gains).unwrap_or_else(|| {
+                    known.push(*gains);
+                    known.len() - 1
+                })
+            });
+            places.push(of_candidate.collect());
+        }
+        let mut jobs = Vec::new();
+        for course in self.courses {
+            for (member, gains) in self.members.iter().zip(&distinct) {
+                let place = course.axes.iter().position(|axis| axis.axis == member.axis).unwrap_or(usize::MAX);
+                jobs.push(Job { course, place, data: gains.iter().map(|gains| gains.applied(&member.data)).collect() });
+            }
+        }
+        let count: usize = jobs.iter().map(|job| job.data.len()).sum();
+        self.simulations.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
+        let simulated = responses(self.machine, &jobs);
+        let of_course = |number: usize| &simulated[number * self.members.len()..(number + 1) * self.members.len()];
+        let all = self.courses.iter().enumerate().map(|(number, course)| {
+            places.iter().map(|place| self.residual(number, course, of_course(number), place)).collect()
+        });
+        all.collect()
+    }
+
+    fn residual(
+        &self,
+        number: usize,
+        course: &Course,
+        simulated: &[Vec<super::simulate::Response>],
+        place: &[usize],
+    ) -> Residual {
+        let setpoint_s = self.machine.cycle.time_base.setpoint_period_s();
+        let found = self.members.iter().enumerate().filter_map(|(member, known)| {
+            let of_axis = course.axes.iter().find(|axis| axis.axis == known.axis)?;
+            Some((of_axis, simulated[member].get(place[member])?))
+        });
+        if self.objective == Objective::Contour {
+            let lags: Vec<(AxisId, usize, &[f64])> = found
+                .map(|(of_axis, response)| (of_axis.axis, of_axis.steps, response.following_lu.as_slice()))
+                .collect();
+            let of = self.tool.errors_mm(course, &self.paths_mm[number], &lags);
+            return Residual { of, components: 3, period_s: setpoint_s };
+        }
+        let one = found.map(|(of_axis, response)| {
+            let of =
+                if self.objective == Objective::Following { &response.following_lu } else { &response.deviation_lu };
+            Residual { of: of.clone(), components: 1, period_s: setpoint_s / of_axis.steps as f64 }
+        });
+        one.last().unwrap_or(Residual { of: Vec::new(), components: 1, period_s: setpoint_s })
+    }
+
+    /// Scores of candidates.
+    pub fn scores(&self, candidates: &[Vec<Gains>]) -> Vec<Score> {
+        let residuals = self.residuals(candidates);
+        (0..candidates.len()).map(|candidate| score(residuals.iter().map(|course| &course[candidate]))).collect()
+    }
+
+    /// What is to be small.
+    pub fn figure(&self, score: &Score) -> f64 {
+        match self.measure {
+            Measure::Rms => score.mean_square,
+            // Equal peaks are told apart by the rest.
+            Measure::Peak => score.peak + 1e-3 * score.mean_square.sqrt(),
+        }
+    }
+
+    /// Rounded as written to a file.
+    fn rounded(&self, gains: &[Gains]) -> Vec<Gains> {
+        let mut rounded = gains.to_vec();
+        for slot in &self.slots {
+            let kind = slot
+                .members
+                .first()
+                .map_or(AxisKind::Linear, |member| self.machine.axis(self.members[*member].axis).kind);
+            let inside = slot.gain.rounded(kind, self.value(gains, slot));
+            self.put(&mut rounded, slot, inside);
+        }
+        rounded
+    }
+
+    /// Whether new gains are better than old ones by more than chance.
+    fn better(&self, old: &[Gains], new: &[Gains]) -> bool {
+        let residuals = self.residuals(&[old.to_vec(), new.to_vec()]);
+        let scores: Vec<Score> = (0..2).map(|place| score(residuals.iter().map(|course| &course[place]))).collect();
+        if self.measure == Measure::Peak {
+            return self.figure(&scores[1]) < self.figure(&scores[0]);
+        }
+        let worth = if self.objective == Objective::Contour { WORTH_CONTOUR_RATIO } else { WORTH_RATIO };
+        let mut differences = Vec::new();
+        for course in &residuals {
+            let block = ((BLOCK_S / course[0].period_s) as usize).max(1) * course[0].components;
+            let mean = |part: &[f64]| part.iter().map(|one| one * one).sum::<f64>() / part.len().max(1) as f64;
+            differences.extend(
+                course[0].of.chunks(block).zip(course[1].of.chunks(block)).map(|(old, new)| mean(old) - mean(new)),
+            );
+        }
+        let count = differences.len().max(2) as f64;
+        let mean = differences.iter().sum::<f64>() / count;
+        let variance = differences.iter().map(|one| (one - mean) * (one - mean)).sum::<f64>() / (count - 1.0);
+        scores[1].mean_square < worth * worth * scores[0].mean_square
+            && mean > CERTAIN_ERRORS * (variance / count).sqrt()
+    }
+
+    /// New gains, and how certain they are.
+    fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, bool) {
+        let before = self.before();
+        let theory = self.theory();
+        let ends: Vec<(Vec<Gains>, Score)> =
+            [&before, &theory].into_iter().map(|start| gauss_newton(self, start, &theory)).collect();
+        let best = ends.into_iter().min_by(|one, other| self.figure(&one.1).total_cmp(&self.figure(&other.1)));
+        let found = best.map_or_else(|| before.clone(), |(gains, score)| search(self, gains, score));
+        let found = self.rounded(&found);
+        let kept = !self.better(&before, &found);
+        let gains = if kept { before } else { found };
+        let certainty = certainty(self, &gains, &theory);
+        (gains, certainty, kept)
+    }
+}
+
+/// Over courses.
+pub(super) fn score<'r>(residuals: impl Iterator<Item = &'r Residual>) -> Score {
+    let (mut sum, mut courses, mut peak) = (0.0, 0, 0.0_f64);
+    for residual in residuals {
+        let (square, ticks, largest) = residual.figures();
+        sum += square / ticks.max(1) as f64;
+        courses += 1;
+        peak = peak.max(largest);
+    }
+    Score { mean_square: sum / f64::from(courses.max(1)), peak }
+}
+
+/// Tunes. Errors: nothing to tune.
+pub fn tune(
+    machine: &Machine,
+    mut courses: Vec<Course>,
+    options: &TuneOptions,
+    tell: &mut dyn FnMut(&str),
+) -> Result<Tuned, Diagnostic> {
+    calibrate(machine, &mut courses);
+    courses.sort_by_key(|course| course.validates);
+    let training = courses.iter().filter(|course| !course.validates).count();
+    let tool = Tool::new(machine);
+    let paths_mm: Vec<Vec<[f64; 3]>> = courses.iter().map(|course| tool.path_mm(course)).collect();
+    let (mut warnings, mut axes, mut landscapes, mut simulations) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for course in &courses {
+        warnings.extend(course.warnings.iter().cloned());
+    }
+    let mut after: Vec<(AxisId, Gains)> = Vec::new();
+    let groups = groups(machine, &courses[..training], options)?;
+    for (number, members) in groups.iter().enumerate() {
+        let names: Vec<&str> = members.iter().map(|axis| machine.axis(*axis).name.as_str()).collect();
+        tell(&format!("{} ({} of {})", names.join(", "), number + 1, groups.len()));
+        let own_objective = match options.objective {
+            Objective::Contour if !members.iter().all(|axis| moves_tool(machine, *axis)) => Objective::Deviation,
+            objective => objective,
+        };
+        let group = group(machine, &courses[..training], &tool, &paths_mm, members, own_objective, options);
+        let (gains, certainty, kept) = group.tuned();
+        if kept {
+            let message = format!(
+                "{}: no gains are better than those of the machine by more than chance, and by enough to last: kept",
+                names.join(", ")
+            );
+            warnings.push(Diagnostic::note("U0003", message));
+        }
+        axes.extend(tuned_axes(&group, &gains, &certainty));
+        after.extend(members.iter().copied().zip(gains.iter().copied()));
+        if options.landscape {
+            landscapes.extend(maps(&group, &gains));
+        }
+        simulations += group.simulations.load(std::sync::atomic::Ordering::Relaxed);
+    }
+    axes.sort_by_key(|axis| axis.axis);
+    for axis in &axes {
+        for gain in axis.gains.iter().filter(|gain| !gain.certain) {
+            let message = format!("{}: the courses do not tell {}", axis.name, gain.gain.key(axis.kind));
+            let help = "it is as theory has it, or as it was: tune on a course with more acceleration and reversals of this axis";
+            warnings.push(Diagnostic::note("U0004", message).help(help));
+        }
+    }
+    tell("figures");
+    let figures = course_figures(machine, &courses, &tool, &paths_mm, &after, options.objective);
+    let sensitivities = sensitivities(machine, &courses[..training], &tool, &paths_mm, &after, options.objective);
+    Ok(Tuned { axes, courses: figures, sensitivities, landscapes, warnings, simulations })
+}
+
+/// Axes with a drive that move, one group or one each.
+fn groups(machine: &Machine, training: &[Course], options: &TuneOptions) -> Result<Vec<Vec<AxisId>>, Diagnostic> {
+    let wanted = |axis: &AxisId| {
+        let name = &machine.axis(*axis).name;
+        options.axes.is_empty() || options.axes.iter().any(|wanted| wanted == name)
+    };
+    let moving: Vec<AxisId> = machine
+        .axis_ids()
+        .filter(wanted)
+        .filter(|axis| {
+            training.iter().flat_map(|course| &course.axes).any(|of_axis| of_axis.axis == *axis && of_axis.moves)
+        })
+        .collect();
+    if moving.is_empty() {
+        let message = "no axis with a drive moves: there is nothing to tune";
+        return Err(Diagnostic::error("U0002", message)
+            .help("name a program that moves axes with [axes.*.drive]; --axis names them"));
+    }
+    let (together, alone): (Vec<AxisId>, Vec<AxisId>) =
+        moving.into_iter().partition(|axis| options.objective == Objective::Contour && moves_tool(machine, *axis));
+    let mut groups: Vec<Vec<AxisId>> = if together.is_empty() { Vec::new() } else { vec![together] };
+    groups.extend(alone.into_iter().map(|axis| vec![axis]));
+    Ok(groups)
+}
+
+fn group<'a>(
+    machine: &'a Machine,
+    courses: &'a [Course],
+    tool: &'a Tool,
+    paths_mm: &'a [Vec<[f64; 3]>],
+    axes: &[AxisId],
+    objective: Objective,
+    options: &TuneOptions,
+) -> Group<'a> {
+    let members: Vec<Member> = axes
+        .iter()
+        .filter_map(|id| {
+            let axis = machine.axis(*id);
+            let data = axis.drive.clone()?;
+            let idle = |gain: &Gain| *gain == Gain::Torque && data.feedforward_inertia_kg_m2 == 0.0;
+            let free = Gain::ALL.into_iter().filter(|gain| options.gains.contains(gain) && !idle(gain));
+            // Without friction there is nothing to compensate.
+            let ranges = free
+                .map(|gain| (gain, range(options, gain, axis, &data)))
+                .filter(|(_, range)| range[1] > range[0])
+                .collect();
+            Some(Member { axis: *id, data, ranges })
+        })
+        .collect();
+    let mut slots: Vec<Slot> = Vec::new();
+    for (place, member) in members.iter().enumerate() {
+        for (gain, range) in &member.ranges {
+            let shared = *gain == Gain::Delay && objective == Objective::Contour;
+            match slots.iter_mut().find(|slot| shared && slot.gain == Gain::Delay) {
+                Some(slot) => slot.members.push(place),
+                None => slots.push(Slot { gain: *gain, members: vec![place], range: *range }),
+            }
+        }
+    }
+    let measure = options.measure;
+    Group { machine, courses, tool, paths_mm, members, slots, objective, measure, simulations: Default::default() }
+}
+
+fn tuned_axes(group: &Group<'_>, gains: &[Gains], certainty: &[Certainty]) -> Vec<TunedAxis> {
+    let before = group.before();
+    let name = |member: usize| group.machine.axis(group.members[member].axis).name.clone();
+    let of_member = |(place, member): (usize, &Member)| {
+        let kind = group.machine.axis(member.axis).kind;
+        let mut together = vec![name(place)];
+        let mut of_axis = Vec::new();
+        for (slot, certainty) in group.slots.iter().zip(certainty).filter(|(slot, _)| slot.members.contains(&place)) {
+            let shown = |inside: f64| slot.gain.shown(kind, inside);
+            let inside = gains[place].get(slot.gain);
+            let margin = 1e-6 * (slot.range[1] - slot.range[0]);
+            if slot.members.len() > 1 {
+                together = slot.members.iter().map(|member| name(*member)).collect();
+            }
+            of_axis.push(TunedGain {
+                gain: slot.gain,
+                before: shown(before[place].get(slot.gain)),
+                value: shown(inside),
+                low: shown(certainty.low),
+                high: shown(certainty.high),
+                at_bound: inside <= slot.range[0] + margin || inside >= slot.range[1] - margin,
+                certain: certainty.certain,
+            });
+        }
+        TunedAxis { axis: member.axis, name: name(place), kind, gains: of_axis, together }
+    };
+    group.members.iter().enumerate().map(of_member).collect()
+}

@@ -1,0 +1,13 @@
+//! The room `identify`: what it finds on traces whose truth is known, how right its intervals are, and what it refuses.
+
+#[path = "../random/mod.rs"]
+mod random;
+#[path = "../test_machine/mod.rs"]
+mod test_machine;
+
+mod chain;
+mod control;
+mod made;
+mod other_plant;
+mod refusals;
+mod trust;

@@ -1,0 +1,109 @@
+//! What a trace cannot tell is refused, with what to record instead; what it can tell is given all the same.
+
+use crate::made::{ALL, Noise, legs, machine, moves, simulate, trace};
+use sollwert::identify::{AxisResult, IdentifyOptions, Parameter, TorqueSource, identify, machine_text};
+
+/// The drive of X of the Spinner on some motion, recorded in some signals.
+fn of(legs: &[(f64, f64, f64)], stems: &[&str], sets: &[&str]) -> AxisResult {
+    let machine = machine("spinner_mvc850", sets);
+    let axis = machine.axis(machine.axis_by_name("X").unwrap());
+    let noise = Noise::usual(7);
+    let signals = simulate(axis, &machine.cycle.time_base, &moves(1e-3, legs), noise.scale_lu);
+    let trace = trace(axis, 1e-3, &signals, stems, noise);
+    let options = IdentifyOptions { axes: Vec::new(), linear_only: true };
+    identify(&[trace], &machine, &options, &mut |_| {}).expect("one axis").remove(0)
+}
+
+fn refused(result: &AxisResult, parameter: Parameter, word: &str) {
+    let refusal =
+        result.refusal(parameter).unwrap_or_else(|| panic!("{parameter:?} is given: {:?}", result.estimate(parameter)));
+    assert!(refusal.reason.contains(word), "{parameter:?}: {refusal:?}");
+    assert!(!refusal.remedy.is_empty());
+    assert!(result.estimate(parameter).is_none());
+}
+
+#[test]
+fn one_direction_does_not_tell_friction_from_gravity() {
+    let result = of(&[(60.0, 40.0, 1000.0), (60.0, 120.0, 1000.0), (90.0, 250.0, 1500.0)], &ALL, &[]);
+    refused(&result, Parameter::Coulomb, "positive direction only");
+    refused(&result, Parameter::Gravity, "positive direction only");
+    let constant = result.figures.iter().find(|figure| figure.key == "dry_torque_n_m").expect("the sum is told");
+    assert!((constant.value - 0.6).abs() < 0.02, "{constant:?}");
+    assert!(result.estimate(Parameter::Inertia).is_some(), "{:?}", result.refusals);
+}
+
+#[test]
+fn one_speed_does_not_tell_viscous_friction() {
+    let back_and_forth: Vec<(f64, f64, f64)> =
+        (0..6).map(|k| (if k % 2 == 0 { 40.0 } else { -40.0 }, 40.0, 8000.0)).collect();
+    let result = of(&back_and_forth, &ALL, &[]);
+    refused(&result, Parameter::Viscous, "one constant speed only");
+    refused(&result, Parameter::Coulomb, "one constant speed only");
+}
+
+#[test]
+fn slow_ramps_do_not_tell_an_inertia() {
+    let result = of(&[(20.0, 5.0, 8.0), (-20.0, 5.0, 8.0), (20.0, 10.0, 8.0), (-20.0, 10.0, 8.0)], &ALL, &[]);
+    assert!(result.refusal(Parameter::Inertia).is_some(), "{:?}", result.estimate(Parameter::Inertia));
+    assert!(result.estimate(Parameter::Coulomb).is_some(), "{:?}", result.refusals);
+}
+
+#[test]
+fn position_alone_does_not_tell_feedforward_from_delay() {
+    let result = of(&legs(), &["position_setpoint", "position_measured"], &[]);
+    refused(&result, Parameter::VelocityFeedforward, "position alone");
+    refused(&result, Parameter::SetpointDelay, "kvff - Kv d_pos");
+    refused(&result, Parameter::Inertia, "no trace has a current");
+    let lag = result.figures.iter().find(|figure| figure.key == "position_lag_ms").expect("the whole lag is told");
+    // kvff = 1: what is left is the balancing delay of 1.2 ms.
+    // Friction at the reversals moves it a little.
+    assert!((lag.value - 1.2).abs() < 0.05, "{lag:?}");
+}
+
+#[test]
+fn a_sampled_current_is_mended_and_a_mean_is_not_touched() {
+    let sampled = ["position_setpoint", "position_measured", "current"];
+    let identified = ["axes.X.drive.identified=true"];
+    let result = of(&legs(), &sampled, &identified);
+    assert_eq!(result.torque_source, Some(TorqueSource::Current));
+    let inertia = result.estimate(Parameter::Inertia).expect("mended");
+    assert!((inertia.low..=inertia.high).contains(&0.0085), "{inertia:?}");
+    assert!((inertia.value / 0.0085 - 1.0).abs() < 0.01, "{inertia:?}");
+    let said = result.verdicts.iter().find(|verdict| verdict.contains("sawtooth")).expect("it is said");
+    assert!(said.contains("% of"), "{said}");
+    // Guessed controllers: the correction is worth less.
+    let guessed = of(&legs(), &sampled, &[]).estimate(Parameter::Inertia).copied().expect("mended");
+    assert!(guessed.high - guessed.low > 1.5 * (inertia.high - inertia.low), "{guessed:?} against {inertia:?}");
+    // Without set-points nobody can tell.
+    refused(&of(&legs(), &["position_measured", "current"], &[]), Parameter::Inertia, "sawtooth");
+}
+
+#[test]
+fn without_the_feedforward_signal_gain_and_feedforward_are_found_together() {
+    let stems = ["position_setpoint", "position_measured", "control_deviation", "velocity_command"];
+    let sets = ["axes.X.drive.velocity_feedforward=0.9", "axes.X.drive.feedforward_delay_ms=0.3"];
+    let result = of(&legs(), &stems, &sets);
+    let value = |parameter| result.estimate(parameter).unwrap_or_else(|| panic!("{:?}", result.refusals)).value;
+    assert!((value(Parameter::PositionGain) - 50.0).abs() < 0.05);
+    assert!((value(Parameter::VelocityFeedforward) - 0.9).abs() < 0.9e-3);
+    assert!((value(Parameter::FeedforwardDelay) - 0.3).abs() < 0.1);
+}
+
+#[test]
+fn a_machine_file_keeps_comments_and_order() {
+    let result = of(&legs(), &ALL, &[]);
+    let machine = machine("spinner_mvc850", &[]);
+    let text = include_str!("../../machines/spinner_mvc850.toml");
+    let written = machine_text(text, &machine, std::slice::from_ref(&result)).expect("tables take values");
+    let comments = |text: &str| {
+        text.lines().filter(|line| line.trim_start().starts_with('#')).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(comments(text), comments(&written));
+    let keys = |text: &str| {
+        text.lines().filter_map(|line| line.split_once(" =")).map(|(key, _)| key.to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(keys(text), keys(&written));
+    let line = written.lines().find(|line| line.starts_with("inertia_kg_m2")).expect("X is the first axis");
+    assert!(line.contains("identified, 95 %:") && line.contains("was 0.0085"), "{line}");
+    assert!(written.contains("identified = true"));
+}

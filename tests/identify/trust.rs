@@ -1,0 +1,120 @@
+//! On synthetic traces with 1 um scale, 0.05 A current noise and 0.02 A quantum the values are right and the intervals hold.
+//!
+//! `IDENTIFY_REPETITIONS=200 cargo test --release --test identify` is the nightly run; fewer repetitions always run.
+
+use crate::made::{ALL, Noise, legs, machine, moves, simulate, trace};
+use crate::random::Random;
+use sollwert::identify::{AxisResult, IdentifyOptions, Parameter, identify};
+
+/// A drive with everything that is to be found.
+pub const SETS: &[&str] = &[
+    "axes.X.drive.velocity_feedforward=0.93",
+    "axes.X.drive.torque_feedforward=0.6",
+    "axes.X.drive.setpoint_delay_ms=1.37",
+    "axes.X.drive.feedforward_delay_ms=0.45",
+    "axes.X.mechanics.gravity_n_m=0.35",
+];
+/// Truth, and the share (the delay: ms) within which it is to be found.
+const TRUTH: [(Parameter, f64, f64); 9] = [
+    (Parameter::Inertia, 0.0085, 0.01 * 0.0085),
+    (Parameter::Viscous, 0.010, 0.03 * 0.010),
+    (Parameter::Coulomb, 0.6, 0.005 * 0.6),
+    (Parameter::Gravity, 0.35, 0.005 * 0.35),
+    (Parameter::PositionGain, 50.0, 0.01 * 50.0),
+    (Parameter::VelocityFeedforward, 0.93, 0.001 * 0.93),
+    (Parameter::TorqueFeedforward, 0.6, 0.001 * 0.6),
+    (Parameter::SetpointDelay, 1.37, 0.1),
+    (Parameter::FeedforwardDelay, 0.45, 0.1),
+];
+
+/// One repetition: noise by the seed, and another place on the scale.
+fn repetition(seed: u64, linear_only: bool) -> AxisResult {
+    let machine = machine("spinner_mvc850", SETS);
+    let axis = machine.axis(machine.axis_by_name("X").unwrap());
+    let noise = Noise::usual(seed);
+    let mut x = moves(1e-3, &legs());
+    let start_mm = Random::new(seed + 1000).between(-50.0, 50.0);
+    x.iter_mut().for_each(|x| *x += start_mm);
+    let signals = simulate(axis, &machine.cycle.time_base, &x, noise.scale_lu);
+    let trace = trace(axis, 1e-3, &signals, &ALL, noise);
+    let options = IdentifyOptions { axes: Vec::new(), linear_only };
+    identify(&[trace], &machine, &options, &mut |_| {}).expect("a trace with one axis").remove(0)
+}
+
+#[test]
+fn values_are_right() {
+    for (seed, linear_only) in [(1, true), (1, false), (2, false)] {
+        let found = repetition(seed, linear_only);
+        for (parameter, truth, within) in TRUTH {
+            let estimate = found.estimate(parameter).unwrap_or_else(|| panic!("{parameter:?}: {:?}", found.refusals));
+            let off = (estimate.value - truth).abs();
+            assert!(off < within, "seed {seed}, linear {linear_only}: {parameter:?} {estimate:?}, truth {truth}");
+        }
+        if !linear_only {
+            for (parameter, truth) in [(Parameter::SpeedGain, 2.0), (Parameter::SpeedResetTime, 10.0)] {
+                let estimate = found.estimate(parameter).expect("the motion tells the speed loop");
+                assert!((estimate.value / truth - 1.0).abs() < 0.02, "seed {seed}: {parameter:?} {estimate:?}");
+            }
+        }
+    }
+}
+
+/// Repetitions that always run; the nightly run asks for 200.
+const REPETITIONS: u64 = 30;
+
+fn asked() -> Option<u64> {
+    std::env::var("IDENTIFY_REPETITIONS").ok().and_then(|text| text.parse().ok())
+}
+
+/// How often a value was given, and how often its interval held the truth.
+fn counted(repetitions: u64, linear_only: bool, truth: &[(Parameter, f64)]) -> Vec<(u64, u64)> {
+    let mut counts = vec![(0, 0); truth.len()];
+    for seed in 0..repetitions {
+        let found = repetition(seed, linear_only);
+        for ((parameter, truth), (given, inside)) in truth.iter().zip(&mut counts) {
+            if let Some(estimate) = found.estimate(*parameter) {
+                *given += 1;
+                *inside += u64::from((estimate.low..=estimate.high).contains(truth));
+            }
+        }
+    }
+    println!("{truth:?}: (given, inside) {counts:?} of {repetitions}");
+    counts
+}
+
+/// 90 % is what is asked for; of few repetitions some more may fail by chance (two standard errors of 95 %).
+fn least_share(repetitions: u64) -> f64 {
+    (0.95 - 2.0 * (0.95_f64 * 0.05 / repetitions as f64).sqrt()).min(0.9)
+}
+
+#[test]
+fn intervals_contain_the_truth() {
+    let repetitions = asked().unwrap_or(REPETITIONS);
+    let truth = [
+        (Parameter::Inertia, 0.0085),
+        (Parameter::Viscous, 0.010),
+        (Parameter::Coulomb, 0.6),
+        (Parameter::Gravity, 0.35),
+    ];
+    let counts = counted(repetitions, true, &truth);
+    for ((parameter, _), (given, inside)) in truth.iter().zip(&counts) {
+        assert_eq!(*given, repetitions, "{parameter:?}");
+        let share = *inside as f64 / *given as f64;
+        assert!(share >= least_share(repetitions), "{parameter:?}: the interval holds in {inside} of {given}");
+    }
+    // An interval that always holds is too wide: not all of them may.
+    let all: u64 = counts.iter().map(|(_, inside)| inside).sum();
+    assert!(all < repetitions * truth.len() as u64, "every interval of {repetitions} repetitions holds");
+}
+
+/// The simulated axis takes ten times as long: nightly only.
+#[test]
+fn intervals_of_the_speed_loop_contain_the_truth() {
+    let Some(repetitions) = asked().map(|asked| asked / 5) else { return };
+    let truth = [(Parameter::SpeedGain, 2.0), (Parameter::SpeedResetTime, 10.0)];
+    for ((parameter, _), (given, inside)) in truth.iter().zip(counted(repetitions, false, &truth)) {
+        assert!(given > repetitions * 9 / 10, "{parameter:?}: given {given} times of {repetitions}");
+        let share = inside as f64 / given as f64;
+        assert!(share >= least_share(repetitions), "{parameter:?}: the interval holds in {inside} of {given}");
+    }
+}
