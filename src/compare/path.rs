@@ -44,6 +44,9 @@ pub struct Match {
 const BLOCK: usize = 128;
 /// Way that the window looks ahead at least, and back.
 const REACH_MIN_MM: f64 = 0.05;
+/// Two places are as near as each other within this share of the squared distance, and within this length.
+const EQUAL_SHARE: f64 = 1.02;
+const EQUAL_MM: f64 = 1e-4;
 /// Farther away than this the track may have lost the line.
 const LOST_MM: f64 = 0.5;
 /// Beyond an end by more than this: the track is not on the line there.
@@ -101,6 +104,12 @@ impl Line {
         let length2 = square(ab);
         let share = if length2 > 0.0 { (dot(ap, ab) / length2).clamp(0.0, 1.0) } else { 0.0 };
         (square(minus(ap, ab.map(|x| x * share))), share)
+    }
+
+    /// Whether segment `j` leads back where a way comes from.
+    fn opposes(&self, j: usize, way_mm: [f64; 3]) -> bool {
+        let Some(end) = self.vertices.get(j + 1) else { return false };
+        dot(minus(end.point_mm, self.vertices[j].point_mm), way_mm) < 0.0
     }
 
     fn matched(&self, j: usize, point_mm: [f64; 3]) -> Match {
@@ -185,9 +194,9 @@ impl<'a> Follower<'a> {
         if !point_mm.iter().all(|x| x.is_finite()) {
             return None;
         }
-        let step_mm = self.last_point_mm.map_or(0.0, |last| norm(minus(point_mm, last)));
+        let way_mm = self.last_point_mm.map_or([0.0; 3], |last| minus(point_mm, last));
         self.last_point_mm = Some(point_mm);
-        let mut best = self.in_window(point_mm, step_mm);
+        let mut best = self.in_window(point_mm, way_mm);
         if best.0 > LOST_MM * LOST_MM {
             if self.wait == 0 {
                 let found = self.anywhere(point_mm, best.0);
@@ -206,34 +215,39 @@ impl<'a> Follower<'a> {
         Some(self.line.matched(best.1, point_mm))
     }
 
-    /// Nearest segment a little way ahead and back: squared distance and number.
-    fn in_window(&self, point_mm: [f64; 3], step_mm: f64) -> (f64, usize) {
+    /// Nearest segment a little way ahead and back: squared distance and number. Where the line runs back over itself both ways are as
+    /// near: the one that leads where the track goes counts.
+    fn in_window(&self, point_mm: [f64; 3], way_mm: [f64; 3]) -> (f64, usize) {
         let vertices = &self.line.vertices;
+        let here = self.line.on_segment(self.at, point_mm).0;
         // A point that cuts a corner lies beside both legs: the nearest place jumps across by as much as the cut.
-        let distance_mm = self.line.on_segment(self.at, point_mm).0.sqrt().min(LOST_MM);
-        let reach_mm = 3.0 * step_mm + REACH_MIN_MM + 4.0 * distance_mm;
-        let mut best = (self.line.on_segment(self.at, point_mm).0, self.at);
+        let reach_mm = 3.0 * norm(way_mm) + REACH_MIN_MM + 4.0 * here.sqrt().min(LOST_MM);
+        let mut best = (here, self.at);
+        let mut along = (if self.line.opposes(self.at, way_mm) { f64::INFINITY } else { here }, self.at);
+        let mut look = |j: usize| {
+            let d = self.line.on_segment(j, point_mm).0;
+            if d < best.0 {
+                best = (d, j);
+            }
+            if d < along.0 && !self.line.opposes(j, way_mm) {
+                along = (d, j);
+            }
+        };
         let from_mm = vertices[self.at].s_mm;
         for j in (self.range[0]..self.at).rev() {
             if from_mm - vertices[j + 1].s_mm > reach_mm {
                 break;
             }
-            let d = self.line.on_segment(j, point_mm).0;
-            if d < best.0 {
-                best = (d, j);
-            }
+            look(j);
         }
         let from_mm = vertices.get(self.at + 1).map_or(from_mm, |v| v.s_mm);
         for (j, vertex) in vertices.iter().enumerate().take(self.range[1] + 1).skip(self.at + 1) {
             if vertex.s_mm - from_mm > reach_mm {
                 break;
             }
-            let d = self.line.on_segment(j, point_mm).0;
-            if d < best.0 {
-                best = (d, j);
-            }
+            look(j);
         }
-        best
+        if along.0 <= EQUAL_SHARE * best.0 + EQUAL_MM * EQUAL_MM { along } else { best }
     }
 
     /// Nearest segment of all; blocks that are too far away are passed over.

@@ -95,6 +95,20 @@ fn both_directions_together_show_what_each_alone_hides() {
 }
 
 #[test]
+fn a_circle_that_is_driven_back_at_once_is_two_circles() {
+    // The path runs back over itself, and the tool lags behind by 20 ms and stays 3 um inside: each way keeps its own samples.
+    let angle = |t: f64| TAU * (smooth((t - 0.5) / 4.0) - smooth((t - 4.5) / 4.0));
+    let a = moved(0.001, 9500, |t| on_circle(25.0, angle(t)), |t, _| on_circle(24.997, angle(t - 0.02)));
+    let circles = examine(&a, None).expect("figures").own.expect("a contour").features.circles;
+    assert_eq!(circles.len(), 2, "{circles:?}");
+    assert!(circles[0].counter_clockwise && !circles[1].counter_clockwise, "{circles:?}");
+    for circle in &circles {
+        assert!((circle.radial_mean_um + 3.0).abs() < 0.1 && circle.deviation_um < 0.2, "{circle:?}");
+        assert!(circle.bidirectional_um.is_some_and(|both| both < 0.2), "{circle:?}");
+    }
+}
+
+#[test]
 fn a_peak_behind_a_quadrant_is_found_there_and_only_there() {
     // 8 um outward, a half sine from 0 to 8 degrees behind 90 degrees.
     let peak_mm = |angle: f64| {
