@@ -89,7 +89,7 @@ def run_binary(binary):
         figures = json.loads(read(binary, "run", program, "-m", machine, "-o", recording, "--json"))
         read(binary, "export", recording, "-o", table)
         document = check(recording, table)
-        for topic in ("/axis/X", "/axis/Y", "/path", "/event", "/tool/setpoint", "/tool/actual"):
+        for topic in ("/axis/X", "/axis/Y", "/path", "/event", "/programmed", "/tool/setpoint", "/tool/actual"):
             hold(topic in document["topics"], f"topic {topic}")
         summary = document["metadata"].get("summary", {})
         cycle_time = json.loads(summary.get("cycle_time_s", "null"))

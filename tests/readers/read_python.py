@@ -18,7 +18,10 @@ def fields(message):
     for field in message.DESCRIPTOR.fields:
         if not field.has_presence or message.HasField(field.name):
             value = getattr(message, field.name)
-            found[field.name] = fields(value) if field.message_type else value
+            if field.is_repeated:
+                found[field.name] = [fields(each) if field.message_type else each for each in value]
+            else:
+                found[field.name] = fields(value) if field.message_type else value
     return found
 
 
