@@ -71,7 +71,7 @@ pub(super) fn signals_of_file(path: &Path) -> Result<Vec<String>, Failure> {
 }
 
 /// Values in memory at most, 8 bytes each.
-const VALUES_MAX: u64 = 120_000_000;
+const VALUES_MAX: u64 = 90_000_000;
 /// What a page keeps of a recording that does not fit: without the rest, and without the second line, and the third.
 const KEPT: [&[&str]; 3] = [
     &["position_setpoint", "position_actual", "path.line", "path.program", "path.feed_mm_min"],
