@@ -53,17 +53,7 @@ pub(super) fn folding(
         meant.push(Motion::from_series(&position, &mean, false, record.period_s, r));
     }
     let inertia = |motions: &[Motion], folded: bool| {
-        let mut unused = AxisResult {
-            axis: axis.name.clone(),
-            estimates: Vec::new(),
-            others: Vec::new(),
-            refusals: Vec::new(),
-            figures: Vec::new(),
-            verdicts: Vec::new(),
-            torque_source: None,
-            friction_points: Vec::new(),
-            notes: Vec::new(),
-        };
+        let mut unused = AxisResult::new(&axis.name);
         one_shot(motions, axis, folded, &mut unused).value(Parameter::Inertia)
     };
     let inertia_ratio = inertia(&sampled, true)? / inertia(&meant, false)?;

@@ -55,27 +55,13 @@ pub fn identify(
     Ok(results)
 }
 
-fn empty(axis: &Axis) -> AxisResult {
-    AxisResult {
-        axis: axis.name.clone(),
-        estimates: Vec::new(),
-        others: Vec::new(),
-        refusals: Vec::new(),
-        figures: Vec::new(),
-        verdicts: Vec::new(),
-        torque_source: None,
-        friction_points: Vec::new(),
-        notes: Vec::new(),
-    }
-}
-
 fn one_axis(
     traces: &[Trace],
     machine: &Machine,
     axis: &Axis,
     options: &IdentifyOptions,
 ) -> Result<AxisResult, Diagnostic> {
-    let mut result = empty(axis);
+    let mut result = AxisResult::new(&axis.name);
     let Some(data) = &axis.drive else {
         for parameter in Parameter::ALL {
             result.refuse(

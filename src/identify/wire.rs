@@ -265,6 +265,21 @@ pub struct AxisResult {
 }
 
 impl AxisResult {
+    /// Nothing is known of the axis yet.
+    pub(super) fn new(axis: &str) -> Self {
+        Self {
+            axis: axis.to_owned(),
+            estimates: Vec::new(),
+            others: Vec::new(),
+            refusals: Vec::new(),
+            figures: Vec::new(),
+            verdicts: Vec::new(),
+            torque_source: None,
+            friction_points: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
     /// The estimate of a parameter.
     pub fn estimate(&self, parameter: Parameter) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.parameter == parameter)
