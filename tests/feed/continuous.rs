@@ -73,7 +73,7 @@ fn a_line_takes_about_the_time_of_the_closed_form_and_never_less() {
     let (a, j) = (limits.acceleration_max_lu_s2, limits.jerk_max_lu_s3);
     let mut random = Random::new(12);
     for _ in 0..60 {
-        let (length_mm, feed_mm_s) = (random.logarithmic(1e-3, 300.0), random.between(2.0, 300.0));
+        let (length_mm, feed_mm_s) = (random.logarithmic(1e-3, 300.0), random.logarithmic(0.05, 300.0));
         let ramp_s = |v: f64| if v <= a * a / j { 2.0 * (v / j).sqrt() } else { v / a + a / j };
         // Both ramps take v times their time: bisection for the highest speed that fits.
         let (mut low, mut high) = (0.0, feed_mm_s);

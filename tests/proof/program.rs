@@ -55,6 +55,9 @@ pub enum Motion {
 /// Digits of the positions of lines.
 const DECIMALS: i32 = 4;
 
+/// Digits of the ends of arcs.
+const ARC_DECIMALS: usize = 6;
+
 fn rounded(value: f64) -> f64 {
     let grid = 10_f64.powi(DECIMALS);
     (value * grid).round() / grid
@@ -231,11 +234,16 @@ impl Printer<'_> {
         }
     }
 
+    /// Behind an arc, which ends where it must, as many as there: a way that is rounded again would be another one on the way back.
+    fn digits(&self) -> usize {
+        if self.at.iter().all(|x| rounded(*x) == *x) { DECIMALS as usize } else { ARC_DECIMALS }
+    }
+
     fn motion(&mut self, feed: f64, motion: &Motion) {
         match motion {
             Motion::Rapid(way) => {
                 self.text += "G0";
-                self.go(way, DECIMALS as usize);
+                self.go(way, self.digits());
                 self.text.push('\n');
                 return;
             }
@@ -243,7 +251,7 @@ impl Printer<'_> {
                 self.text += "G1";
                 // A block that was split has more digits.
                 let whole = way.iter().all(|x| rounded(*x) == *x);
-                self.go(way, if whole { DECIMALS as usize } else { 12 });
+                self.go(way, if whole { self.digits() } else { 12 });
             }
             Motion::Arc { centre: [i, j], sweep_rad, way } => {
                 self.text += if *sweep_rad > 0.0 { "G3" } else { "G2" };
@@ -252,7 +260,7 @@ impl Printer<'_> {
                 let mut way = *way;
                 way[0] = if full { 0.0 } else { i - i * cos + j * sin };
                 way[1] = if full { 0.0 } else { j - i * sin - j * cos };
-                self.go(&way, 6);
+                self.go(&way, ARC_DECIMALS);
                 let _ = write!(self.text, " I{i:.6} J{j:.6}");
             }
             Motion::Spline { word, ways } => {

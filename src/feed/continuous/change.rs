@@ -169,10 +169,9 @@ impl Continuous {
         let before = std::mem::replace(&mut self.regime.moving_ratio, override_ratio);
         let Expected { way_lu: guess_lu, landing_lu } = self.expect(pieces, start, false);
         let count = self.reach(pieces, 0, start);
-        let pieces = &mut pieces[..count];
-        let layout = self.layout(pieces, 0, start);
+        let layout = self.layout(pieces, count, 0, start);
+        let pieces = &pieces[..count];
         let rests = pieces.last().is_some_and(|last| last.rests_after);
-        let pieces = &*pieces;
         let most_lu = self.above_lu(&layout.chain);
         let mut attempt = |way_lu: f64, longer: Option<&Trial>| {
             let mut layout = layout.clone();
@@ -269,7 +268,7 @@ impl Continuous {
         let stretch = if whole { stretch } else { Stretch { to_lu: from_lu + left_lu, ..stretch } };
         let Piece { path, flow, .. } = &mut pieces[last];
         flow.grid = Some(Grid::new(&flow.rules, path, flow.blend, stretch));
-        let layout = self.layout(pieces, 0, start);
+        let layout = self.layout(pieces, last + 1, 0, start);
         pieces[last].flow.grid = grid;
         pieces[last].rests_after = rested;
         (layout, last + 1)

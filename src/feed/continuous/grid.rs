@@ -36,6 +36,9 @@ const INTERVALS_MAX: usize = 20_000;
 /// The interval at a rest is at most this share of its piece.
 const REST_SHARE: f64 = 0.15;
 
+/// At its moving end the speed is at most this share of the highest there: what is left of the ramp has its own intervals.
+const REST_SPEED_SHARE: f64 = 0.3;
+
 /// How often it is halved to find a smooth one.
 const REST_CUTS_MAX: usize = 16;
 
@@ -56,6 +59,8 @@ pub(super) struct Grid {
     pub rests: [bool; 2],
     /// The way that a stop from its highest speed takes, about.
     pub stop_lu: f64,
+    /// It was made for this speed at its end while nothing was known of what comes after it.
+    pub open_lu_s: Option<f64>,
 }
 
 /// How a piece begins or ends.
@@ -226,13 +231,20 @@ impl<'a> Cutter<'a> {
         let half_lu = 0.5 * self.stretch.length_lu();
         let v = ends.iter().fold(self.top_lu_s, |v, end| v.min(self.reached_lu_s(*end, half_lu)));
         let way_lu = self.tangent.stop_lu(v);
-        Grid { intervals: self.intervals, rests, stop_lu: way_lu }
+        Grid { intervals: self.intervals, rests, stop_lu: way_lu, open_lu_s: None }
     }
 
     /// Length of the interval at a rest, from there in this direction; shorter where the curve changes fast.
     fn rest_lu(&self, rest_lu: f64, direction: f64) -> f64 {
         let Tangent { acceleration_lu_s2, jerk_lu_s3, step_s: t, jerk_limited } = self.tangent;
-        let lu = if jerk_limited { jerk_lu_s3 * t.powi(3) / 6.0 } else { acceleration_lu_s2 * t * t / 2.0 };
+        let held_lu_s = constant_speed_lu_s(self.rules, self.path, &self.look(rest_lu));
+        let lu = if jerk_limited {
+            let t = t.min((2.0 * REST_SPEED_SHARE * held_lu_s / jerk_lu_s3).sqrt());
+            jerk_lu_s3 * t.powi(3) / 6.0
+        } else {
+            let t = t.min(REST_SPEED_SHARE * held_lu_s / acceleration_lu_s2);
+            acceleration_lu_s2 * t * t / 2.0
+        };
         let longest_lu = lu.min(REST_SHARE * self.stretch.length_lu());
         let smooth = |length_lu: &f64| {
             let [from, middle, to] = [0.0, 0.5, 1.0].map(|share| self.look(rest_lu + direction * share * length_lu));
@@ -307,6 +319,7 @@ impl<'a> Cutter<'a> {
         let half_lu = 0.5 * (end_lu - start_lu);
         let mut near_s = f64::INFINITY;
         let mut ramp_s = 0.0_f64;
+        let mut step_s = self.tangent.step_s;
         for (end, distance_lu) in self.stretch.ends.iter().zip(distances) {
             let reached_lu_s = self.reached_lu_s(*end, distance_lu);
             let nearer_lu_s = self.reached_lu_s(*end, distance_lu - half_lu);
@@ -319,9 +332,13 @@ impl<'a> Cutter<'a> {
             let from_lu_s = if let End::Speed(v) = end { v.min(held_lu_s) } else { 0.0 };
             let phase_s = self.tangent.step_s / STEP_SHARE;
             ramp_s = ramp_s.max((held_lu_s - from_lu_s) / self.tangent.acceleration_lu_s2 + phase_s);
+            if let Some(ramp) = self.tangent.short_ramp(from_lu_s, held_lu_s)
+                && distance_lu - half_lu <= ramp.way_lu
+            {
+                step_s = step_s.min(ramp.step_s);
+            }
         }
         let mut away_s = GROWTH_SHARE * (near_s - ramp_s).max(0.0);
-        let mut step_s = self.tangent.step_s;
         if let Some(settling_lu_s) = self.stretch.settling.speed_at(distances[0]) {
             (speed_lu_s, step_s, away_s) = (speed_lu_s.max(settling_lu_s), SETTLING_STEP_RATIO * step_s, 0.0);
         }

@@ -70,7 +70,7 @@ impl Profile {
 }
 
 /// How far acceleration and jerk are used at a place, each by the axis that uses it most.
-fn used(interval: &Interval, state: &Derivatives, point: &PathPoint, bend_per_s2: f64) -> [(f64, Limit); 2] {
+pub(super) fn used(interval: &Interval, state: &Derivatives, point: &PathPoint, bend_per_s2: f64) -> [(f64, Limit); 2] {
     let b = point.speed_squared_lu2_s2.max(0.0);
     let mut most = [(0.0, interval.cap.limit); 2];
     for bound in &interval.bounds.axes {

@@ -17,8 +17,13 @@ pub(super) const STEP_SHARE: f64 = 0.25;
 const STEP_MIN_S: f64 = 5e-4;
 pub(super) const STEP_MAX_S: f64 = 0.02;
 
+const RAMP_STEP_MIN_S: f64 = 5e-5;
+
+/// A ramp whose speed grows by less than this share is not worth finer intervals.
+const RAMP_MIN_SHARE: f64 = 0.1;
+
 /// Within an interval the speed grows by this factor at most.
-pub(super) const FASTER_MAX_RATIO: f64 = 1.35;
+pub(super) const FASTER_MAX_RATIO: f64 = 1.18;
 
 /// What the mean of the ends of an interval may miss of its middle, of the greatest demand.
 const MISSED_RATIO: f64 = 0.07;
@@ -167,6 +172,15 @@ impl From<JointState> for Derivatives {
     }
 }
 
+/// A short change of the speed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ramp {
+    /// How far it goes at most.
+    pub way_lu: f64,
+    /// Time of an interval in it.
+    pub step_s: f64,
+}
+
 /// About what a motion may do along its tangent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tangent {
@@ -209,6 +223,20 @@ impl Tangent {
         // s = j t³/6, v = j t²/2
         let by_jerk = from_lu_s + 0.5 * self.jerk_lu_s3 * (6.0 * way_lu / self.jerk_lu_s3).cbrt().powi(2);
         by_acceleration.min(by_jerk)
+    }
+
+    /// A change between two speeds that is over before the greatest acceleration is reached, or before an interval of the usual time is: how far it
+    /// goes, and the time of its intervals.
+    pub fn short_ramp(&self, from_lu_s: f64, to_lu_s: f64) -> Option<Ramp> {
+        let change_lu_s = to_lu_s - from_lu_s;
+        let phase_s = if self.jerk_limited {
+            (change_lu_s / self.jerk_lu_s3).sqrt()
+        } else {
+            change_lu_s / self.acceleration_lu_s2
+        };
+        let step_s = (STEP_SHARE * phase_s).max(RAMP_STEP_MIN_S);
+        let worth = change_lu_s > RAMP_MIN_SHARE * to_lu_s && step_s < self.step_s;
+        worth.then(|| Ramp { way_lu: (from_lu_s + to_lu_s) * phase_s, step_s })
     }
 
     /// The way from a speed to a stop.

@@ -126,6 +126,34 @@ impl Layout {
         self.uncut += usize::from(self.uncut > index);
     }
 
+    /// Puts intervals in two; those that pieces share stay whole. There are no floors.
+    pub fn halve(&mut self, cut: &[bool], pieces: &[Piece<'_>]) {
+        let old = std::mem::take(&mut self.chain);
+        let owners = std::mem::take(&mut self.owners);
+        // Where each interval begins now.
+        let mut starts = Vec::with_capacity(cut.len() + 1);
+        for (index, (interval, junction)) in old.intervals.into_iter().zip(old.junctions).enumerate() {
+            starts.push(self.chain.intervals.len());
+            self.chain.junctions.push(junction);
+            self.owners.push(owners[index]);
+            if !cut[index] {
+                self.chain.intervals.push(interval);
+                continue;
+            }
+            let path = pieces[owners[index]].path;
+            let middle_lu = 0.5 * (interval.start_lu + interval.end_lu);
+            self.chain.intervals.push(interval.part(path, interval.start_lu, middle_lu));
+            self.chain.intervals.push(interval.part(path, middle_lu, interval.end_lu));
+            self.chain.junctions.push(Junction { speed_squared_lu2_s2: f64::INFINITY, limit: interval.cap.limit });
+            self.owners.push(owners[index]);
+        }
+        starts.push(self.chain.intervals.len());
+        for Place { intervals, .. } in &mut self.places {
+            *intervals = starts[intervals.start]..starts[intervals.end];
+        }
+        self.uncut = starts.get(self.uncut).copied().unwrap_or(self.uncut);
+    }
+
     /// Appends the grid of a piece; where the plan begins or ends at rest there and the grid was not made for it, the first or last interval is cut.
     fn cut(&mut self, piece: &Piece<'_>, owner: usize, starts_at_rest: bool, ends_at_rest: bool) {
         let start = self.chain.intervals.len();

@@ -21,6 +21,7 @@ mod layout;
 mod refuge;
 mod regime;
 mod rows;
+mod sharpen;
 
 use super::limits::AxisRules;
 use super::profile::SpeedCap;
@@ -48,6 +49,9 @@ const STALE_PIECES: usize = 20;
 
 /// Intervals of a plan at least, if the window has them.
 const REACH_INTERVALS: f64 = 24.0;
+
+/// A grid for an end about which nothing was known yet serves an end that is slower, down to this share.
+const SLOWER_RATIO: f64 = 0.8;
 
 /// Places nearer to each other than this share of an interval are one.
 const SAME_PLACE_RATIO: f64 = 1e-9;
@@ -177,31 +181,32 @@ impl Continuous {
         let start = self.start();
         let known = known.min(pieces.len().saturating_sub(1));
         let count = self.reach(pieces, known, start);
-        let pieces = &mut pieces[..count];
-        let mut layout = self.layout(pieces, known, start);
+        let mut layout = self.layout(pieces, count, known, start);
+        let pieces = &pieces[..count];
         if self.regime.settling_lu > 0.0 {
             self.settle(&mut layout, pieces, self.regime.settling_lu);
         }
         let Some(profile) = self.attempt(&mut layout, pieces, start) else { return false };
+        let (layout, profile) = self.sharpened(layout, profile, pieces, start);
         let rests = pieces.last().is_some_and(|last| last.rests_after);
         self.adopt(layout, profile, rests);
         true
     }
 
-    /// The chain of these pieces; the first `known` ones have their places already.
-    fn layout(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> Layout {
+    /// The chain of the first `count` pieces; the first `known` ones have their places already.
+    fn layout(&mut self, pieces: &mut [Piece<'_>], count: usize, known: usize, start: Start) -> Layout {
         let entry_lu2_s2 = match (start, self.places.get(known)) {
             (Start::At(point), _) if known == 0 => point.speed_squared_lu2_s2,
             (_, Some(place)) => self.profile.points[place.intervals.start].speed_squared_lu2_s2,
             (_, None) => self.profile.points.get(self.first).map_or(0.0, |point| point.speed_squared_lu2_s2),
         };
-        let speeds_lu_s = group::border_speeds(pieces, known, entry_lu2_s2.sqrt());
+        let speeds_lu_s = group::border_speeds(&pieces[..count], known, entry_lu2_s2.sqrt());
         let cut_first = start == Start::Rest || self.regime.from_lu > 0.0;
         let entry = match start {
             Start::At(point) if known == 0 => Some(point),
             _ => None,
         };
-        let stretches = group::stretches(pieces, known, &speeds_lu_s, cut_first, entry);
+        let stretches = group::stretches(&pieces[..count], known, &speeds_lu_s, cut_first, entry);
         let mut first = known;
         for stretch in &stretches {
             if let Stretch::Cut = stretch {
@@ -211,7 +216,7 @@ impl Continuous {
         }
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
         layout.entry = entry;
-        layout.extend(pieces, known, stretches, start == Start::Rest);
+        layout.extend(&pieces[..count], known, stretches, start == Start::Rest);
         if self.regime.from_lu > 0.0 && known == 0 {
             layout.frees_start();
         }
@@ -368,10 +373,16 @@ impl Continuous {
         pieces.len()
     }
 
-    /// Makes the grid of a piece, if it has none.
+    /// Makes the grid of a piece, if it has none, or one for the end of a window that has moved on to a slow place.
     fn cut_piece(&self, pieces: &mut [Piece<'_>], index: usize, start: Start) {
-        if pieces[index].flow.grid.is_some() {
-            return;
+        let is_last = index + 1 == pieces.len();
+        if let Some(grid) = &pieces[index].flow.grid {
+            let again = !is_last
+                && index > 0
+                && grid.open_lu_s.is_some_and(|v| group::speed_after_lu_s(pieces, index) < SLOWER_RATIO * v);
+            if !again {
+                return;
+            }
         }
         let ends = self.ends(pieces, index, start);
         let ahead_lu = match self.regime.transition {
@@ -380,7 +391,8 @@ impl Continuous {
         };
         let stretch = self.regime.stretch(pieces[index].path, ends, (index > 0).then_some(ahead_lu));
         let Piece { path, flow, .. } = &mut pieces[index];
-        flow.grid = Some(Grid::new(&flow.rules, path, flow.blend, stretch));
+        let open_lu_s = if let (End::Speed(v), true) = (ends[1], is_last) { Some(v) } else { None };
+        flow.grid = Some(Grid { open_lu_s, ..Grid::new(&flow.rules, path, flow.blend, stretch) });
     }
 
     /// About the speeds at the ends of a piece.
