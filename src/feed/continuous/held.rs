@@ -28,6 +28,9 @@ const NEAR_RATIO: f64 = 0.7;
 /// quarters an eighth of it would be missed.
 const MISSED_MAX_RATIO: f64 = 0.004;
 
+/// Places of an interval that are looked at where the eighths are not enough.
+const PLACES_MAX: usize = 65;
+
 impl Profile {
     /// State inside an interval, `share` of its length from its start.
     pub fn inside(&self, chain: &Chain, index: usize, share: f64) -> (PathPoint, f64) {
@@ -115,8 +118,16 @@ fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) 
     let mut states = interval.eighths(Some([at(2), at(6)]));
     let misses = |place: &usize| missed(chain, profile, index, *place, [&states[*place], &expected[*place]]);
     if [2, 6].iter().map(misses).any(|ratio| ratio > MISSED_MAX_RATIO || ratio.is_nan()) {
+        let between = states;
         for eighth in [1, 3, 5, 7] {
             states[eighth] = at(eighth);
+        }
+        let misses = |place: &usize| missed(chain, profile, index, *place, [&states[*place], &between[*place]]);
+        if [1, 3, 5, 7].iter().map(misses).any(|ratio| ratio > MISSED_MAX_RATIO || ratio.is_nan()) {
+            // A curve that turns within a part of the interval may have its peak between the eighths.
+            let place = |i: usize| look(index, interval.start_lu + i as f64 / 64.0 * interval.length_lu());
+            let states: [Derivatives; PLACES_MAX] = std::array::from_fn(place);
+            return most_used(interval, profile, chain, index, &states);
         }
     }
     most_used(interval, profile, chain, index, &states)
@@ -161,32 +172,38 @@ fn used_straight(interval: &Interval, profile: &Profile, chain: &Chain, index: u
     most
 }
 
-fn most_used(interval: &Interval, profile: &Profile, chain: &Chain, index: usize, states: &[Derivatives; 9]) -> f64 {
-    let places: [(PathPoint, f64); 9] = std::array::from_fn(|i| profile.inside(chain, index, 0.125 * i as f64));
+/// `states`: at equal distances, up to [`PLACES_MAX`] of them.
+fn most_used(interval: &Interval, profile: &Profile, chain: &Chain, index: usize, states: &[Derivatives]) -> f64 {
+    let count = states.len().min(PLACES_MAX);
+    let share = |i: usize| i as f64 / (count - 1) as f64;
+    let mut places = [(PathPoint { speed_squared_lu2_s2: 0.0, slope_lu_s2: 0.0 }, 0.0); PLACES_MAX];
+    let places = &mut places[..count];
+    places.iter_mut().enumerate().for_each(|(i, place)| *place = profile.inside(chain, index, share(i)));
     if places.iter().any(|(point, _)| !positive(point)) {
         return f64::NAN;
     }
     let mut most = 0.0_f64;
     for bound in &interval.bounds.axes {
-        let (mut accelerations, mut jerks) = ([0.0; 9], [0.0; 9]);
+        let (mut accelerations, mut jerks) = ([0.0; PLACES_MAX], [0.0; PLACES_MAX]);
+        let (accelerations, jerks) = (&mut accelerations[..count], &mut jerks[..count]);
         for (i, ((point, bend), state)) in places.iter().zip(states).enumerate() {
             let [acceleration, jerk] = demands(bound, state, point, *bend);
             accelerations[i] = acceleration;
             jerks[i] = jerk * point.speed_squared_lu2_s2.sqrt();
         }
-        if accelerations.iter().chain(&jerks).any(|demand| !demand.is_finite()) {
+        if accelerations.iter().chain(jerks.iter()).any(|demand| !demand.is_finite()) {
             return f64::NAN;
         }
-        most = most.max(summit(&accelerations) / bound.acceleration_lu_s2);
+        most = most.max(summit(accelerations) / bound.acceleration_lu_s2);
         if let Some(jerk) = bound.jerk_lu_s3 {
-            most = most.max(summit(&jerks) / jerk);
+            most = most.max(summit(jerks) / jerk);
         }
     }
     most
 }
 
 /// Greatest amount of a function that is known at equal distances: between them by parabolas.
-fn summit(values: &[f64; 9]) -> f64 {
+fn summit(values: &[f64]) -> f64 {
     let mut most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     for triple in values.windows(3) {
         let [left, middle, right] = [triple[0], triple[1], triple[2]];
