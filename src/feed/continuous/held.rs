@@ -22,7 +22,7 @@ const JUNCTION_SHARE: f64 = 0.999;
 const SLOWED_MAX_RATIO: f64 = 4.0;
 
 /// Above this use of a limit the curve itself is looked at, at its quarters.
-const NEAR_RATIO: f64 = 0.7;
+const NEAR_RATIO: f64 = 0.5;
 
 /// Where demands there are further than this from what the ends and the middle make one expect, of the limit, at its eighths: by cubics between the
 /// quarters an eighth of it would be missed.
@@ -111,7 +111,8 @@ fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) 
     }
     let expected = interval.eighths(None);
     let rough = most_used(interval, profile, chain, index, &expected);
-    if rough < NEAR_RATIO || rough.is_nan() {
+    // What was found to exceed a limit once stays in view: with less of it the rough figure says less, not the curve.
+    if (rough < NEAR_RATIO && !interval.tightened) || rough.is_nan() {
         return rough;
     }
     let at = |eighth: usize| look(index, interval.start_lu + 0.125 * eighth as f64 * interval.length_lu());
@@ -269,7 +270,7 @@ pub(super) fn tighten(chain: &mut Chain, profile: &Profile, range: &std::ops::Ra
 fn used_at_rest(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) -> f64 {
     let Some(interval) = chain.intervals.get(index).filter(|interval| !interval.is_straight()) else { return 0.0 };
     let rough = most_used_at_rest(chain, profile, index, &interval.eighths(None));
-    if rough < NEAR_RATIO || rough.is_nan() {
+    if (rough < NEAR_RATIO && !interval.tightened) || rough.is_nan() {
         return rough;
     }
     let mut eighths = interval.eighths(None);
