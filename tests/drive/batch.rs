@@ -159,7 +159,8 @@ fn drives_come_and_go() {
         }
         if k == 250 {
             for drives in [&mut single[..], batch.drives_mut()] {
-                (drives[12].brake(30.0, 0.02), drives[13].brake(-30.0, 0.02));
+                drives[12].brake(30.0, 0.02);
+                drives[13].brake(-30.0, 0.02);
             }
         }
     }

@@ -240,8 +240,7 @@ fn follow_says_which_limits_its_table_exceeds() {
         let (start, signals) = (Default::default(), SignalChoice::all());
         let options = FollowOptions { machine: &loaded, start, recording: None, signals, mantissa_bits: None };
         let warnings = follow(&table, &options).unwrap().warnings;
-        let told: Vec<String> = warnings.iter().filter(|w| w.code == "F0013").map(|w| w.message.clone()).collect();
-        told
+        warnings.iter().filter(|w| w.code == "F0013").map(|w| w.message.clone()).collect::<Vec<String>>()
     };
     assert_eq!(told(4.0, 3.0), Vec::<String>::new());
     let told = told(120.0, 66.0);
