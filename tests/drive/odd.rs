@@ -201,20 +201,18 @@ fn any_options_neither_panic_nor_break_a_limit() {
     }
 }
 
-/// T_v = T_p: form 7.2 with the larger half of a speed cycle.
+/// T_v = T_p: form 7.2 with the larger half of a speed cycle. Without viscous friction: with it the torque is a staircase, and the form is off by 3e-5 here.
 #[test]
 fn one_speed_cycle_in_a_position_cycle() {
     let rig = mvc_x().friction(0.0, 0.0).with(|data| {
         data.speed_cycle_ticks = data.position_cycle_ticks;
+        data.mechanics.viscous_friction_n_m_s_per_rad = 0.0;
         data.velocity_feedforward_ratio = 1.0;
     });
-    // The position loop is damped less than usual: 2.5 s for its swing to die out.
-    let a = 150.0;
-    let last = rig.follow(2.5, |t_s| 0.5 * a * t_s * t_s).pop().expect("signals");
+    let a = 300.0;
+    let last = rig.follow(1.0, |t_s| 0.5 * a * t_s * t_s).pop().expect("signals");
     let (data, period_s) = (&rig.data, rig.position_period_s());
-    let friction_s =
-        data.mechanics.viscous_friction_n_m_s_per_rad * data.speed_reset_time_s / data.speed_gain_n_m_s_per_rad;
-    let expected_lu = a * (period_s - period_s / 2.0 + friction_s) / data.position_gain_per_s;
+    let expected_lu = a * (period_s - period_s / 2.0) / data.position_gain_per_s;
     // As form 7.2: rounding of x_set over T_p.
     assert!((last.control_deviation_lu - expected_lu).abs() < 1e-8 * expected_lu, "{}", last.control_deviation_lu);
 }
