@@ -86,7 +86,8 @@ pub(super) fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     let options = ImportOptions {
         axes: pairs(&arguments.axes, "--axis", false)?,
         drives: pairs(&arguments.drives, "--drive", true)?,
-        name: arguments.name.clone().or_else(|| stem.filter(|_| base.is_none())),
+        name: arguments.name.clone(),
+        stand_in: stem.filter(|_| base.is_none()),
         base,
     };
     let imported = import_listing(&files, &options).map_err(|findings| {
