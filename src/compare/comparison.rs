@@ -371,7 +371,7 @@ fn cycle_times(trace: &Trace, reference: &Trace) -> [(Option<f64>, &'static str)
         _ => {
             // The same field of both: an actual value comes to rest later than its set-point.
             let both = |stem: &&str| [trace, reference].iter().all(|side| motion_time_s(side, stem).is_some());
-            let common: Vec<&str> = MOTION_STEMS.iter().copied().filter(|stem| both(&stem)).collect();
+            let common: Vec<&str> = MOTION_STEMS.iter().copied().filter(both).collect();
             let stems = if common.is_empty() { MOTION_STEMS.as_slice() } else { &common[..1] };
             [motion_of(trace, stems), motion_of(reference, stems)]
         }
