@@ -41,6 +41,10 @@ pub(in crate::feed) struct Ramp {
 impl Ramp {
     /// The same behind the way in which the path comes to speed; `None`: the ramp is over by then.
     fn behind_start(self, lead_lu_rad: f64, acceleration_lu_s2: f64, jerk_lu_s3: Option<f64>) -> Option<Self> {
+        // A path that asks nothing of any axis has no start either.
+        if !acceleration_lu_s2.is_finite() || jerk_lu_s3.is_some_and(|jerk| !jerk.is_finite()) {
+            return Some(self);
+        }
         let sense = self.change_rad_s().signum();
         let (mut time_s, mut now_rad_s) = (0.0, self.speed_rad_s);
         // The speed depends on the time, and the time on the speed: it settles at once, because axes accelerate faster than spindles.
