@@ -279,7 +279,8 @@ impl<S: PieceSource> Kernel<S> {
             }
         }
         let stands = |axis| AxisSetpoint { position_lu: last.axes[axis].position_lu, ..AxisSetpoint::default() };
-        let mut standing = Setpoint { tick, axes: PerAxis::from_fn(stands), ..last };
+        let spindle = self.interpolator.spindle_behind_end(self.next_setpoint);
+        let mut standing = Setpoint { tick, axes: PerAxis::from_fn(stands), spindle, ..last };
         standing.path.limit = Limit { kind: LimitKind::InPosition, axis: None };
         standing.path.programmed_feed_lu_s = None;
         self.ahead.setpoint = Some(standing);

@@ -80,7 +80,7 @@ impl Samples<'_> {
 }
 
 /// Title, and the fields (of axes without unit, of the path with it) in it; `true` = dashed.
-const GROUPS: [(&str, &[(&str, bool)]); 12] = [
+const GROUPS: [(&str, &[(&str, bool)]); 14] = [
     ("Feed", &[("path.feed_mm_min", false), ("path.programmed_feed_mm_min", true)]),
     ("Contour error", &[("path.contour_error_mm", false)]),
     ("Control deviation", &[("control_deviation", false)]),
@@ -117,6 +117,8 @@ const GROUPS: [(&str, &[(&str, bool)]); 12] = [
     ("Current", &[("current", false), ("current_mean", false), ("current_reference", true)]),
     ("Motor speed", &[("motor_speed", false), ("motor_speed_reference", true)]),
     ("Voltage", &[("voltage", false)]),
+    ("Spindle speed", &[("spindle.speed_actual_rpm", false), ("spindle.speed_setpoint_rpm", true)]),
+    ("Spindle angle", &[("spindle.angle_actual_deg", false), ("spindle.angle_setpoint_deg", true)]),
 ];
 
 /// Fields that are in a plot but not shown at first: they say nearly the same as another.
@@ -159,7 +161,9 @@ pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &C
     let sides = [Some(trace), reference.map(|(other, _)| other)];
     for (side, of_reference) in sides.into_iter().zip([false, true]) {
         for signal in side.into_iter().flat_map(|side| &side.signals) {
-            let path = signal.name.as_deref().is_some_and(|name| name.starts_with("path.") || name.ends_with(".flags"));
+            let path = signal.name.as_deref().is_some_and(|name| {
+                name.starts_with("path.") || name.starts_with("spindle.") || name.ends_with(".flags")
+            });
             if !known(signal) && !path && signal.labels.is_empty() {
                 add(&mut plots, "Other signals", curve(signal, of_reference, true, of_reference), &signal.unit);
             }
@@ -215,6 +219,11 @@ fn repeats(side: &Trace, signal: &Signal, leading: &str) -> bool {
 fn is_of(signal: &Signal, field: &str) -> bool {
     if field.starts_with("path.") {
         return signal.name.as_deref() == Some(field) && signal.values.iter().any(|value| value.is_finite());
+    }
+    if field.starts_with("spindle.") {
+        // A spindle that stands all along says nothing.
+        return signal.name.as_deref() == Some(field)
+            && signal.values.iter().any(|value| value.is_finite() && *value != 0.0);
     }
     signal.axis_signal().is_some_and(|own| own.stem() == field) && signal.values.iter().any(|value| value.is_finite())
 }
