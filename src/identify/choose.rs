@@ -87,10 +87,32 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// The whole search.
     pub(super) fn run(&mut self) {
+        self.time_law();
         self.fitted();
         self.rounds();
         if self.left() > MUCH_LEFT {
             self.begin_elsewhere();
+        }
+    }
+
+    /// The time law that comes nearest after a few passes from the numbers of the file: numbers fitted to the wrong one are no place to begin from.
+    fn time_law(&mut self) {
+        self.say("time along the path");
+        let mut machines = vec![self.fit.machine.clone()];
+        machines.extend(Switch::TimeLaw.others(&self.fit.machine));
+        let start = self.fit.clone();
+        for machine in machines {
+            if self.done() {
+                return;
+            }
+            self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&machine)));
+            let knobs = self.knobs_of(&machine, false);
+            let mut trial = Fit { machine, plans: self.fit.plans, ..start.clone() };
+            let cost = trial.run(&knobs, Aim::Both, 2 * PASSES.0, NONE_LEFT * NONE_LEFT);
+            self.fit.plans = trial.plans;
+            if let Some(cost) = cost.filter(|cost| *cost < self.cost) {
+                (self.fit, self.cost) = (trial, cost);
+            }
         }
     }
 
@@ -155,6 +177,13 @@ impl<'a, 'b> Search<'a, 'b> {
             let knobs = self.knobs_of(&other, false);
             let mut trial = Fit { machine: other, ..self.fit.clone() };
             trial.values.retain(|(knob, _)| !matches!(knob, Knob::FollowUp | Knob::Overload) || knobs.contains(knob));
+            let mut afresh = trial.clone();
+            afresh.values.retain(|(knob, _)| knob.is_of_shape());
+            let [present, file] =
+                [trial.cost(Aim::Both), afresh.cost(Aim::Both)].map(|cost| cost.unwrap_or(f64::INFINITY));
+            if file < present {
+                trial.values = afresh.values;
+            }
             let cost = trial.run(&knobs, Aim::Both, PASSES.0, NONE_LEFT * NONE_LEFT);
             self.fit.plans = trial.plans;
             if let Some(cost) = cost
