@@ -62,6 +62,43 @@ impl Pen<'_> {
         }
         self.to("", [0.0, 0.0], "");
     }
+
+    /// Arcs that touch, in both senses, from the middle and back.
+    fn arcs(&mut self, speed: f64) {
+        let feed = self.feed(speed);
+        self.lines.line(&format!("; arcs that touch\nG17 G642 CTOL=0.01 {feed}"));
+        for (before, point, radius_mm) in [
+            ("G1", [10.0, 0.0], 0.0),
+            ("G3", [12.0, 2.0], 2.0),
+            ("G2", [14.0, 4.0], 2.0),
+            ("G1", [14.0, 8.0], 0.0),
+            ("G3", [4.0, 18.0], 10.0),
+            ("G2", [-1.0, 23.0], 5.0),
+            ("G1", [-5.0, 23.0], 0.0),
+            ("G3", [-5.8, 22.2], 0.8),
+            ("G2", [-9.8, 18.2], 4.0),
+            ("G1", [-15.0, 18.2], 0.0),
+            ("G1", [0.0, 0.0], 0.0),
+        ] {
+            let radius = if radius_mm > 0.0 { format!("CR={:.4}", radius_mm * self.scale) } else { String::new() };
+            self.to(before, point, &radius);
+        }
+    }
+
+    /// A straight line in blocks that are shorter than the way to stop.
+    fn straight(&mut self, speed: f64) {
+        let feed = self.feed(speed);
+        self.lines.line(&format!("; blocks that are shorter than the way to stop\nG64 {feed}"));
+        let start = [-HALF_MM + 5.0, 0.0];
+        self.to("", start, "");
+        for k in 1..=SHORT {
+            // A little aside, so that no control makes one block of them.
+            let aside = if k % 2 == 0 { 0.0 } else { 1e-3 };
+            self.lines.seconds -= 8.0 * self.scale / self.feed;
+            self.to("", [start[0] + SHORT_MM * k as f64, aside], "");
+        }
+        self.to("", [0.0, 0.0], "");
+    }
 }
 
 /// For machines with X and Y.
@@ -112,35 +149,8 @@ pub(super) fn control(machine: &Machine, plane: [&Axis; 2], vertical: Option<&Ax
     let feed = pen.feed(0.12 * velocity);
     pen.lines.line(&format!("; corners without rounding\nG64 {feed}"));
     pen.polyline(0.0, &G64_TURNS_DEG, |_| 5.0);
-    let feed = pen.feed(0.2 * velocity);
-    pen.lines.line(&format!("; arcs that touch\nG17 G642 CTOL=0.01 {feed}"));
-    for (before, point, radius_mm) in [
-        ("G1", [10.0, 0.0], 0.0),
-        ("G3", [12.0, 2.0], 2.0),
-        ("G2", [14.0, 4.0], 2.0),
-        ("G1", [14.0, 8.0], 0.0),
-        ("G3", [4.0, 18.0], 10.0),
-        ("G2", [-1.0, 23.0], 5.0),
-        ("G1", [-5.0, 23.0], 0.0),
-        ("G3", [-5.8, 22.2], 0.8),
-        ("G2", [-9.8, 18.2], 4.0),
-        ("G1", [-15.0, 18.2], 0.0),
-        ("G1", [0.0, 0.0], 0.0),
-    ] {
-        let radius = if radius_mm > 0.0 { format!("CR={:.4}", radius_mm * scale) } else { String::new() };
-        pen.to(before, point, &radius);
-    }
-    let feed = pen.feed(0.8 * velocity);
-    pen.lines.line(&format!("; blocks that are shorter than the way to stop\nG64 {feed}"));
-    let start = [-HALF_MM + 5.0, 0.0];
-    pen.to("", start, "");
-    for k in 1..=SHORT {
-        // A little aside, so that no control makes one block of them.
-        let aside = if k % 2 == 0 { 0.0 } else { 1e-3 };
-        pen.lines.seconds -= 8.0 * scale / pen.feed;
-        pen.to("", [start[0] + SHORT_MM * k as f64, aside], "");
-    }
-    pen.to("", [0.0, 0.0], "");
+    pen.arcs(0.2 * velocity);
+    pen.straight(0.8 * velocity);
     pen.lines.seconds += 10.0 * RAMP_S;
     pen.lines.rest(0.5);
     closing(&mut pen.lines);

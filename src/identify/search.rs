@@ -52,7 +52,7 @@ const BLOCK: usize = 60;
 /// What a free number moved by 1 does at least, in RMS, for the knob to count.
 const DOES_SOMETHING: f64 = 2e-3;
 /// Condition from which two settings count as one.
-const ALIKE: f64 = 300.0;
+const ALIKE: f64 = 40.0;
 
 /// A fit in progress.
 #[derive(Clone)]
