@@ -73,7 +73,7 @@ fn wrong(message: &str, help: &str) -> Failure {
 
 /// Calibrates the control.
 pub(super) fn calibration(arguments: &IdentifyArguments) -> Result<(), Failure> {
-    if arguments.traces.len() % 2 != 0 || arguments.traces.is_empty() {
+    if !arguments.traces.len().is_multiple_of(2) || arguments.traces.is_empty() {
         return Err(wrong(
             "--smoothing takes a trace and its program, or several such pairs",
             "write `sollwert identify --smoothing TRACE PROGRAM -m MACHINE`; pairs not used for the fit with --validate TRACE PROGRAM",
