@@ -5,7 +5,7 @@
 
 use super::bands::is_constant;
 use crate::compare::{Alignment, Comparison, Part, Series, Side};
-use crate::trace::{Signal, TimeGrid, Trace};
+use crate::trace::{AxisSignal, Signal, TimeGrid, Trace};
 
 /// Curves of one plot at most: more cannot be told apart.
 const SIGNALS_MAX: usize = 24;
@@ -146,7 +146,10 @@ pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &C
                     if rank > 0 && side.is_some_and(|side| repeats(side, signal, leading)) {
                         continue;
                     }
-                    let shown = !HIDDEN.contains(field) || rank == 0;
+                    // What says nearly the same as another is hidden where there is the other.
+                    let alone =
+                        |own: AxisSignal<'_>| side.is_some_and(|side| side.axis_signal(own.axis, leading).is_none());
+                    let shown = !HIDDEN.contains(field) || rank == 0 || signal.axis_signal().is_some_and(alone);
                     add(&mut plots, title, curve(signal, *dashed || of_reference, shown, of_reference), &signal.unit);
                 }
             }
@@ -162,6 +165,9 @@ pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &C
             }
         }
     }
+    // Axes that rest in a simulation and are not in the control's trace at all.
+    let of_interest = |curve: &Curve<'_>| !curve.of_reference || !is_constant(&curve.samples.series());
+    plots.retain(|plot| plot.curves.iter().any(of_interest));
     add_budget(&mut plots, side);
     let mut room = CURVES_MAX;
     let mut left_out = 0;
@@ -251,6 +257,13 @@ fn differences<'a>(trace: &'a Trace, reference: &'a Trace, comparison: &Comparis
             None => "Difference".to_owned(),
         };
         add(&mut plots, &title, curve, &pair.unit);
+    }
+    // A plot of zeros tells nothing that the table does not say; where all are zero, that is what is to be seen.
+    let differs = |plot: &Plot<'_>| {
+        plot.curves.iter().any(|curve| matches!(&curve.samples, Samples::Made { values, .. } if values.iter().any(|v| *v != 0.0 && !v.is_nan())))
+    };
+    if plots.iter().any(differs) {
+        plots.retain(differs);
     }
     plots
 }

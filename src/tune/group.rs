@@ -319,7 +319,7 @@ impl Group<'_> {
     }
 
     /// New gains, and how certain they are.
-    fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, bool) {
+    fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, Option<&'static str>) {
         let before = self.before();
         let theory = self.theory();
         let ends: Vec<(Vec<Gains>, Score)> =
@@ -333,8 +333,16 @@ impl Group<'_> {
                 .iter()
                 .zip(&self.slots)
                 .any(|(certainty, slot)| slot.gain == Gain::Delay && !certainty.certain);
-        let kept = untold || !self.better(&before, &found);
-        let gains = if kept { before } else { found };
+        let kept = if found == before {
+            Some("the best gains found are those of the machine")
+        } else if untold {
+            Some("the paths do not tell the common delay, and without it the other gains say nothing: kept")
+        } else if !self.better(&before, &found) {
+            Some("no gains are better than those of the machine by more than chance, and by enough to last: kept")
+        } else {
+            None
+        };
+        let gains = if kept.is_some() { before } else { found };
         let certainty = certainty(self, &gains, &theory);
         (gains, certainty, kept)
     }
@@ -379,12 +387,8 @@ pub fn tune(
         };
         let group = group(machine, &courses[..training], &tool, &paths_mm, members, own_objective, options);
         let (gains, certainty, kept) = group.tuned();
-        if kept {
-            let message = format!(
-                "{}: no gains are better than those of the machine by more than chance, and by enough to last, or the courses do not tell the delay: kept",
-                names.join(", ")
-            );
-            warnings.push(Diagnostic::note("U0003", message));
+        if let Some(why) = kept {
+            warnings.push(Diagnostic::note("U0003", format!("{}: {why}", names.join(", "))));
         }
         axes.extend(tuned_axes(&group, &gains, &certainty));
         after.extend(members.iter().copied().zip(gains.iter().copied()));

@@ -353,3 +353,34 @@ fn a_course_on_which_an_axis_does_not_move_says_nothing_of_it() {
     }
     assert_ne!(of(&text, "X"), of(&loaded.text_as_used, "X"));
 }
+
+#[test]
+fn what_is_not_used_or_recorded_too_slowly_is_said() {
+    let loaded = machine(&[]);
+    let codes = |course: Course| {
+        let found = tuned(&loaded, vec![course], &TuneOptions::default());
+        found.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>()
+    };
+    let short = course(&loaded, "t.mpf", "G1 X5 F2000\nX0\nM30\n", false);
+    assert!(!codes(short).contains(&"U0005"));
+    let long = course(&loaded, "t.mpf", "G1 X5 F2000\nX0\nG4 F125\nG1 X3\nM30\n", false);
+    assert!((long.duration_s - 120.0).abs() < 0.1, "{} s", long.duration_s);
+    assert!(long.warnings.iter().any(|warning| warning.code == "U0005"));
+
+    let x = loaded.machine.axis_by_name("X").unwrap();
+    let positions = setpoints(&loaded, "SOFT\nG1 X12 F8000\nX0\nM30\n", x);
+    let errors = alone_lu(&loaded, "X", &positions, |_| {});
+    let every = |steps: usize| {
+        let thin = |values: &[f64]| values.iter().step_by(steps).copied().collect::<Vec<f64>>();
+        let trace = Trace {
+            name: "measured.csv".to_owned(),
+            signals: vec![
+                signal("X.position_setpoint_mm", thin(&positions), 1e-3 * steps as f64),
+                signal("X.control_deviation_mm", thin(&errors), 1e-3 * steps as f64),
+            ],
+            ..Trace::default()
+        };
+        codes(course_of_trace(&trace, &loaded.machine, false).unwrap())
+    };
+    assert!(!every(1).contains(&"U0006") && every(4).contains(&"U0006"));
+}
