@@ -19,7 +19,7 @@ fn at_speed_cycle(machine: &Machine, step_n_m: f64) -> Trace {
         let input = DriveInput { position_setpoint_lu: x, load_n_m: 0.0, feedforward_active: true };
         drive.step_each(input, |tick, signals| {
             if tick % every == 0 {
-                rows.push(signals.clone());
+                rows.push(*signals);
             }
         });
     }
@@ -31,7 +31,8 @@ fn at_speed_cycle(machine: &Machine, step_n_m: f64) -> Trace {
         torque.values.iter_mut().for_each(|value| *value = (*value / step_n_m).round() * step_n_m);
     }
     let template: Signal = trace.signals[0].clone();
-    let fields: [(&str, fn(&AxisSignals) -> f64); 2] =
+    type Of = fn(&AxisSignals) -> f64;
+    let fields: [(&str, Of); 2] =
         [("motor_speed_reference", |s| s.motor_speed_reference_rad_s), ("motor_speed", |s| s.motor_speed_rad_s)];
     for (stem, of) in fields {
         let name = sollwert::trace::axis_signal_name("X", axis.kind, stem).expect("a known field");
