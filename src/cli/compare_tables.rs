@@ -151,12 +151,28 @@ fn lines_text(comparison: &Comparison) -> String {
     format!("\nNC lines whose time differs most\n{}", table(&rows))
 }
 
+/// Pairs by name that are listed; more are counted.
+const PAIRS_LISTED_MAX: usize = 12;
+
 fn pairs_text(pairs: &[PairFigures]) -> String {
     if pairs.is_empty() {
         return String::new();
     }
     let mut text = "\npairs\n".to_owned();
-    for pair in pairs {
+    // Two recordings share a hundred signals: what is a pair by its name alone is counted, --json and the page list it.
+    let by_name = |pair: &&PairFigures| pair.name == pair.reference_name && pair.zero == 0.0;
+    let mut reasons: Vec<(&str, usize)> = Vec::new();
+    for pair in pairs.iter().filter(by_name) {
+        match reasons.iter_mut().find(|(reason, _)| *reason == pair.reason) {
+            Some((_, count)) => *count += 1,
+            None => reasons.push((&pair.reason, 1)),
+        }
+    }
+    let counted = |reason: &str| reasons.iter().any(|(known, count)| *known == reason && *count > PAIRS_LISTED_MAX);
+    for (reason, count) in reasons.iter().filter(|(_, count)| *count > PAIRS_LISTED_MAX) {
+        text += &format!("  {count} signals of one name in both: {reason}\n");
+    }
+    for pair in pairs.iter().filter(|pair| !(by_name(pair) && counted(&pair.reason))) {
         let zero = if pair.zero == 0.0 {
             String::new()
         } else {

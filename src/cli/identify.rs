@@ -31,13 +31,13 @@ What a trace must hold, and how the values and their 95 % intervals are found, i
 traces cannot tell is refused, with what to record instead. Torque constant, transmission and cycles are
 those of the machine file.")]
 pub(super) struct IdentifyArguments {
-    /// Traces: recordings, or what a control exported; several are used together. With --smoothing: a trace and its program
+    /// Traces: recordings, or what a control exported; several are used together. With --smoothing: a trace and its program, then others
     #[arg(required_unless_present = "plan", value_name = "TRACE")]
     pub(super) traces: Vec<PathBuf>,
     /// Write NC programs to run while the machine is traced, and say which signals to trace
     #[arg(long, conflicts_with = "smoothing")]
     plan: bool,
-    /// Calibrate the control on the set-points of a program: TRACE PROGRAM
+    /// Calibrate the control on the set-points of a program, or of several: TRACE PROGRAM [TRACE PROGRAM ...]
     #[arg(long)]
     smoothing: bool,
     /// With --smoothing: another traced program, not used for the fit; may be given several times

@@ -73,29 +73,30 @@ fn wrong(message: &str, help: &str) -> Failure {
 
 /// Calibrates the control.
 pub(super) fn calibration(arguments: &IdentifyArguments) -> Result<(), Failure> {
-    let [trace, program] = arguments.traces.as_slice() else {
+    if !arguments.traces.len().is_multiple_of(2) || arguments.traces.is_empty() {
         return Err(wrong(
-            "--smoothing takes one trace and one program",
-            "write `sollwert identify --smoothing TRACE PROGRAM -m MACHINE`; more with --validate TRACE PROGRAM",
+            "--smoothing takes a trace and its program, or several such pairs",
+            "write `sollwert identify --smoothing TRACE PROGRAM -m MACHINE`; pairs not used for the fit with --validate TRACE PROGRAM",
         ));
-    };
+    }
     let inputs = arguments.traces.iter().chain(&arguments.validate).map(PathBuf::as_path);
     if let Some(output) = &arguments.output {
         refuse_same_file(inputs, output)?;
     }
     let loaded = arguments.machine.load_to_run()?;
     let machine = &loaded.machine;
-    let mut pairs = vec![(trace, program)];
-    pairs.extend(arguments.validate.chunks_exact(2).map(|pair| (&pair[0], &pair[1])));
+    let fitted = arguments.traces.len() / 2;
+    let pairs = || arguments.traces.chunks_exact(2).chain(arguments.validate.chunks_exact(2));
     let mut read_pairs = Vec::new();
-    for (trace, program) in pairs {
+    for (trace, program) in pairs().map(|pair| (&pair[0], &pair[1])) {
         let setup = arguments.surroundings.open(program, machine)?;
-        read_pairs.push((read(trace, &["position_setpoint"], arguments, machine)?, setup));
+        read_pairs.push((read(trace, &["position_setpoint", "path.feed_mm_min"], arguments, machine)?, setup));
     }
     let traced: Vec<TracedProgram<'_>> =
         read_pairs.iter().map(|(trace, setup)| TracedProgram { trace, setup: setup.clone() }).collect();
     let line = std::cell::RefCell::new(ProgressLine::new());
-    let result = calibrate(&traced[0], &traced[1..], machine, &mut |what| line.borrow_mut().update(|| what.to_owned()));
+    let (used, unseen) = traced.split_at(fitted);
+    let result = calibrate(used, unseen, machine, &mut |what| line.borrow_mut().update(|| what.to_owned()));
     drop(line);
     let result = result.map_err(|finding| Failure::found_wrong(vec![finding]))?;
     if let Some(output) = &arguments.output {
@@ -104,10 +105,7 @@ pub(super) fn calibration(arguments: &IdentifyArguments) -> Result<(), Failure> 
         show(&calibrated.warnings);
         write_whole(output, &calibrated.text_as_used)?;
     }
-    let files: Vec<String> = std::iter::once(program)
-        .chain(arguments.validate.iter().skip(1).step_by(2))
-        .map(|path| path.display().to_string())
-        .collect();
+    let files: Vec<String> = pairs().map(|pair| pair[1].display().to_string()).collect();
     if arguments.json {
         let mut document = control_document(&result, &files, &loaded);
         if let Some(output) = &arguments.output {
@@ -127,10 +125,10 @@ fn control_document(result: &ControlResult, files: &[String], loaded: &Loaded) -
     let estimates: serde_json::Map<String, Value> = result
         .estimates
         .iter()
-        .map(|e| (e.key.to_owned(), json!({"value": e.value, "unit": "", "low": e.low, "high": e.high})))
+        .map(|e| (e.key.clone(), json!({"value": e.value, "unit": "", "low": e.low, "high": e.high})))
         .collect();
     let refused: serde_json::Map<String, Value> =
-        result.refusals.iter().map(|(key, reason)| ((*key).to_owned(), json!({"reason": reason}))).collect();
+        result.refusals.iter().map(|(key, reason)| (key.clone(), json!({"reason": reason}))).collect();
     let choices: serde_json::Map<String, Value> =
         result.choices.iter().map(|(key, word)| ((*key).to_owned(), json!(word))).collect();
     let of = |agreement: &Agreement| {
@@ -146,7 +144,7 @@ fn control_document(result: &ControlResult, files: &[String], loaded: &Loaded) -
         .zip(files)
         .enumerate()
         .map(|(place, ((before, after), file))| {
-            json!({"program": file, "used": place == 0, "before": of(before), "after": of(after)})
+            json!({"program": file, "used": place < result.fitted, "before": of(before), "after": of(after)})
         })
         .collect();
     json!({
@@ -165,7 +163,7 @@ fn control_text(result: &ControlResult, files: &[String]) -> String {
     let mut rows = vec![["setting", "value", "95 %: from", "to", ""].map(str::to_owned).to_vec()];
     rows.extend(result.estimates.iter().map(|e| {
         let number = |value: f64| format!("{value:.4}");
-        vec![e.key.to_owned(), number(e.value), number(e.low), number(e.high), e.title.to_owned()]
+        vec![e.key.clone(), number(e.value), number(e.low), number(e.high), e.title.to_owned()]
     }));
     rows.extend(result.choices.iter().map(|(key, word)| vec![(*key).to_owned(), word.clone()]));
     let mut text = table(&rows);
@@ -190,13 +188,13 @@ fn control_text(result: &ControlResult, files: &[String]) -> String {
             )
         };
         rows.push(vec![
-            format!("{file}{}", if place == 0 { "" } else { " (not used)" }),
+            format!("{file}{}", if place < result.fitted { "" } else { " (not used)" }),
             format!("{:.3} s", before.traced_s),
             time(before),
             time(after),
             percent(before.feed_rms_share),
             percent(after.feed_rms_share),
-            format!("{:.5} mm", after.path_rms_mm),
+            if after.path_rms_mm.is_finite() { format!("{:.5} mm", after.path_rms_mm) } else { "-".to_owned() },
         ]);
     }
     text + "\n" + &table(&rows) + &format!("  {} plans of the program\n", result.plans)

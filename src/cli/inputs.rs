@@ -5,7 +5,7 @@
 use super::failure::Failure;
 use super::output::{ProgressLine, show};
 use crate::base::diagnostics::nearest;
-use crate::base::units::percent_from_ratio;
+use crate::base::units::{percent_from_ratio, ratio_from_percent};
 use crate::base::{Diagnostic, SourceText};
 use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
@@ -196,12 +196,21 @@ pub(super) struct Surroundings {
     /// Skip levels to activate, such as 0,3: blocks with / or /3 are not executed
     #[arg(long = "skip", value_name = "LEVELS", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(0..=9))]
     skip: Vec<u8>,
+    /// Switch of the spindle override at the control panel, in % of S
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0, value_parser = spindle_percent)]
+    spindle_override: f64,
     /// Tool table (docs/workshop-file.md); without one the length of every tool is 0
     #[arg(short, long, value_name = "TOOLS.toml")]
     tools: Option<PathBuf>,
     /// Zero offsets (G54 and so on) of the same form; may also stand in the file of the tools
     #[arg(short = 'z', long, value_name = "OFFSETS.toml")]
     offsets: Option<PathBuf>,
+}
+
+/// MD12060 and MD12070 of most machines.
+fn spindle_percent(text: &str) -> Result<f64, String> {
+    let percent = text.trim_end_matches('%').parse::<f64>().ok().filter(|percent| (1.0..=200.0).contains(percent));
+    percent.ok_or_else(|| "expected 1 to 200 %".to_owned())
 }
 
 impl Surroundings {
@@ -221,6 +230,7 @@ impl Surroundings {
             directories: self.include.clone(),
             shipped: SHIPPED_PROGRAMS,
             definitions: definitions.iter().map(open).collect::<Result<_, _>>()?,
+            spindle_override_ratio: ratio_from_percent(self.spindle_override),
             skip_levels: self.skip.iter().fold(0, |levels, level| levels | 1 << level),
             ..Setup::from(open_program(program)?)
         };

@@ -86,7 +86,8 @@ pub(super) fn import(arguments: &ImportArguments) -> Result<(), Failure> {
     let options = ImportOptions {
         axes: pairs(&arguments.axes, "--axis", false)?,
         drives: pairs(&arguments.drives, "--drive", true)?,
-        name: arguments.name.clone().or_else(|| stem.filter(|_| base.is_none())),
+        name: arguments.name.clone(),
+        stand_in: stem.filter(|_| base.is_none()),
         base,
     };
     let imported = import_listing(&files, &options).map_err(|findings| {
@@ -168,15 +169,15 @@ fn count(imported: &Imported, origins: &[Origin]) -> usize {
 fn overview(imported: &Imported, output: &Path) -> String {
     let mut text = format!("{}\n", output.display());
     let rows = [
-        ("machine data and drive parameters", &[Origin::Datum][..]),
+        ("from machine data and drive parameters", &[Origin::Datum][..]),
         ("derived from such by a rule", &[Origin::Derived]),
-        ("comments of the listing", &[Origin::Carried]),
-        ("the other machine", &[Origin::Base]),
+        ("from comments of the listing", &[Origin::Carried]),
+        ("from the other machine", &[Origin::Base]),
         ("assumed", &[Origin::Assumed]),
     ];
     let rows: Vec<Vec<String>> = rows
         .iter()
-        .map(|(words, origins)| vec![format!("keys from {words}"), count(imported, origins).to_string()])
+        .map(|(words, origins)| vec![format!("keys {words}"), count(imported, origins).to_string()])
         .filter(|row| row[1] != "0")
         .collect();
     text += &table(&rows);

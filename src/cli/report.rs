@@ -99,6 +99,8 @@ fn signals_that_fit(recording: &Recording) -> Result<Vec<String>, Failure> {
                     PATH_FIELDS.iter().filter(|f| only.is_none_or(|only| only.contains(&format!("path.{f}").as_str())));
                 topic.messages.saturating_mul(kept.count() as u64)
             }
+            // The spindle is left out with the other signals that are not named.
+            TopicKind::Spindle if only.is_none() => topic.messages.saturating_mul(topic.fields.len() as u64),
             _ => 0,
         };
         recording.topics().iter().map(of_topic).sum()

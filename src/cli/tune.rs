@@ -93,6 +93,7 @@ enum GainChoice {
     Torque,
     Delay,
     Friction,
+    FrictionTime,
 }
 
 impl GainChoice {
@@ -102,6 +103,7 @@ impl GainChoice {
             Self::Torque => Gain::Torque,
             Self::Delay => Gain::Delay,
             Self::Friction => Gain::Friction,
+            Self::FrictionTime => Gain::FrictionTime,
         }
     }
 }
@@ -191,7 +193,7 @@ fn bound(text: &str) -> Result<(Gain, [f64; 2]), Failure> {
         let finding = Diagnostic::error("C0002", format!("`--bound {text}` are no bounds of a gain"));
         Failure::unreadable(
             finding
-                .help("write --bound velocity=0.9..1.1; gains are velocity, torque, delay (ms), friction; not below 0"),
+                .help("write --bound velocity=0.9..1.1; gains are velocity, torque, delay (ms), friction, friction-time (ms); not below 0"),
         )
     })
 }

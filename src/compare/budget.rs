@@ -70,6 +70,8 @@ pub struct BudgetGround<'a> {
 const WORST_MAX: usize = 20;
 /// Set-points of a control that are farther than this from the program are on another path.
 const OFF_MM: f64 = 5.0;
+/// Rounding of coordinates: a line that is off by less has no error to list.
+pub(super) const ROUNDING_UM: f64 = 1e-6;
 /// Blocks that begin at one instant at most, to be looked through for their first.
 const TOGETHER_MAX: usize = 1000;
 
@@ -206,7 +208,7 @@ fn gathered(samples: impl Iterator<Item = (f64, f64, Option<ProgramLine>)>) -> O
         }
     }
     let mut worst: Vec<(ProgramLine, f64)> = worst.into_iter().collect();
-    worst.retain(|(_, error_um)| *error_um > 0.0);
+    worst.retain(|(_, error_um)| *error_um >= ROUNDING_UM);
     worst.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     worst.truncate(WORST_MAX);
     Some(Part { figures: gathering.finish()?, worst, course })

@@ -12,10 +12,11 @@ use super::lines::{LineTimes, Lines, line_times};
 use super::offset::{Alignment, Channel, align, residual_delay};
 use super::pairs::{Pair, derived, moving, pairs, setpoint_delay_s};
 use super::path::Match;
-use super::series::Series;
+use super::series::{Series, noise_of};
 use super::statistics::{Figures, Gathering};
 use crate::base::Diagnostic;
-use crate::trace::Trace;
+use crate::base::units::percent_from_ratio;
+use crate::trace::{Signal, Trace};
 
 /// What the user asks for.
 #[derive(Clone, Debug, Default)]
@@ -164,7 +165,7 @@ pub fn compare(trace: &Trace, reference: &Trace, options: &CompareOptions) -> Re
         notes.push(apart(found.contour.matched_share));
     }
     let own = [own_contour(&actual[0], &setpoints, 0, &at, plane), own_contour(&actual[1], &setpoints, 1, &at, plane)];
-    let bases = cycle_times(trace, reference, &actual);
+    let bases = cycle_times(trace, reference);
     let [own_a, own_b] = own;
     let [a, b] = bases;
     let [lines_a, lines_b] = &executed;
@@ -196,6 +197,9 @@ fn plane_of(name: Option<&str>) -> Result<usize, Diagnostic> {
         .ok_or_else(|| Diagnostic::error("T0102", format!("`{name}` is no plane")).help("write XY, ZX or YZ"))
 }
 
+/// Less of the motion of both at the same time is said.
+const PARTLY_BELOW_PERCENT: f64 = 60.0;
+
 fn alignment(channels: &[Channel<'_>], options: &CompareOptions, notes: &mut Vec<Diagnostic>) -> Option<Alignment> {
     if let Some(offset_s) = options.offset_s {
         return Some(Alignment::given(offset_s));
@@ -213,9 +217,37 @@ fn alignment(channels: &[Channel<'_>], options: &CompareOptions, notes: &mut Vec
             )
             .help("are these traces of the same program? Give --offset SECONDS if you know it"),
         ),
-        Some(_) => {}
+        Some(at) => notes.extend(partly(channels, at)),
     }
     found
+}
+
+/// Said where most of the motion of both has no counterpart: a simulation with other waiting times agrees in one of its moves only.
+fn partly(channels: &[Channel<'_>], at: &Alignment) -> Option<Diagnostic> {
+    let travel = |series: &Series<'_>, from_s: f64, to_s: f64| -> f64 {
+        let inside = |i: &usize| (from_s..=to_s).contains(&series.time_s(*i));
+        let steps = (1..series.len()).filter(inside).map(|i| (series.values[i] - series.values[i - 1]).abs());
+        steps.filter(|step| step.is_finite()).sum()
+    };
+    let (mut shared, mut whole) = ([0.0; 2], [0.0; 2]);
+    for channel in channels {
+        let (Some(one), Some(other)) = (channel.trace.span_s(), channel.reference.span_s()) else { continue };
+        let (from_s, to_s) = (one.0.max(at.trace_s(other.0)), one.1.min(at.trace_s(other.1)));
+        shared[0] += travel(&channel.trace, from_s, to_s) / channel.scale;
+        shared[1] += travel(&channel.reference, at.reference_s(from_s), at.reference_s(to_s)) / channel.scale;
+        whole[0] += travel(&channel.trace, f64::MIN, f64::MAX) / channel.scale;
+        whole[1] += travel(&channel.reference, f64::MIN, f64::MAX) / channel.scale;
+    }
+    let percent = [0, 1].map(|i| if whole[i] > 0.0 { percent_from_ratio(shared[i] / whole[i]) } else { 100.0 });
+    let most = percent[0].max(percent[1]);
+    (most < PARTLY_BELOW_PERCENT).then(|| {
+        let message = format!(
+            "the traces agree best where only {:.0} % of the motion of the trace and {:.0} % of that of the reference lie at the same time: figures in time are of that part",
+            percent[0], percent[1]
+        );
+        let help = "other waiting times? The view along the path does not mind them; --offset SECONDS compares another part";
+        Diagnostic::warning("T0104", message).help(help)
+    })
 }
 
 fn no_pairs(trace: &Trace, reference: &Trace) -> Diagnostic {
@@ -228,7 +260,7 @@ fn no_pairs(trace: &Trace, reference: &Trace) -> Diagnostic {
 }
 
 fn apart(matched_share: f64) -> Diagnostic {
-    let percent = crate::base::units::percent_from_ratio(1.0 - matched_share);
+    let percent = percent_from_ratio(1.0 - matched_share);
     Diagnostic::warning(
         "T0106",
         format!(
@@ -302,7 +334,7 @@ pub fn examine(trace: &Trace, plane: Option<&str>) -> Result<Side, Diagnostic> {
     };
     let basis = match recorded_cycle_time_s(trace) {
         Some(time_s) => (Some(time_s), RECORDED),
-        None => (motion_time_s(&actual), MOTION),
+        None => motion_of(trace, &MOTION_STEMS),
     };
     let ground = BudgetGround { machine: machine.as_ref(), own: own.as_ref(), ..BudgetGround::default() };
     let budget = budget(trace, &ground);
@@ -330,17 +362,24 @@ fn side(
 
 const RECORDED: &str = "cycle time of the run";
 const MOTION: &str = "first to last motion";
+const LENGTH: &str = "length of the trace: no position moves";
 
 /// Cycle times of both on the same basis: that of the runs where both recordings have it, otherwise the time from the first motion to the last.
-fn cycle_times(trace: &Trace, reference: &Trace, actual: &[Option<Track>; 2]) -> [(Option<f64>, &'static str); 2] {
+fn cycle_times(trace: &Trace, reference: &Trace) -> [(Option<f64>, &'static str); 2] {
     match (recorded_cycle_time_s(trace), recorded_cycle_time_s(reference)) {
         (Some(a), Some(b)) => [(Some(a), RECORDED), (Some(b), RECORDED)],
-        _ => [
-            (motion_time_s(&actual[0]).or_else(|| span_s(trace)), MOTION),
-            (motion_time_s(&actual[1]).or_else(|| span_s(reference)), MOTION),
-        ],
+        _ => {
+            // The same field of both: an actual value comes to rest later than its set-point.
+            let both = |stem: &&str| [trace, reference].iter().all(|side| motion_time_s(side, stem).is_some());
+            let common: Vec<&str> = MOTION_STEMS.iter().copied().filter(both).collect();
+            let stems = if common.is_empty() { MOTION_STEMS.as_slice() } else { &common[..1] };
+            [motion_of(trace, stems), motion_of(reference, stems)]
+        }
     }
 }
+
+/// Fields that say when an axis moves, the best first.
+const MOTION_STEMS: [&str; 4] = ["position_setpoint", "position_actual", "position_measured", "position_reference"];
 
 fn recorded_cycle_time_s(trace: &Trace) -> Option<f64> {
     trace.summary.as_ref()?.get("cycle_time_s")?.as_f64()
@@ -350,15 +389,32 @@ fn span_s(trace: &Trace) -> Option<f64> {
     trace.span_s().map(|(from, to)| to - from)
 }
 
-fn motion_time_s(track: &Option<Track>) -> Option<f64> {
-    let track = track.as_ref()?;
-    let still_mm = (10.0 * track.noise_mm).max(1e-4);
-    let finite = |p: &&[f64; 3]| p.iter().all(|x| x.is_finite());
-    let differs = |p: &[f64; 3], q: &[f64; 3]| (0..3).any(|i| (p[i] - q[i]).abs() > still_mm);
-    let (first, last) = (track.points_mm.iter().find(finite)?, track.points_mm.iter().rfind(finite)?);
-    let from = track.points_mm.iter().position(|p| differs(p, first))?.saturating_sub(1);
-    let to = track.points_mm.iter().rposition(|p| differs(p, last))? + 1;
-    Some(track.time_s(to.min(track.points_mm.len() - 1)) - track.time_s(from))
+/// Time from the first to the last motion of any axis, by the first of the fields that moves; the length of a trace in which none does.
+fn motion_of(trace: &Trace, stems: &[&str]) -> (Option<f64>, &'static str) {
+    match stems.iter().find_map(|stem| motion_time_s(trace, stem)) {
+        Some(time_s) => (Some(time_s), MOTION),
+        None => (span_s(trace), LENGTH),
+    }
+}
+
+fn motion_time_s(trace: &Trace, stem: &str) -> Option<f64> {
+    let of_stem = |signal: &&Signal| signal.axis_signal().is_some_and(|own| own.stem() == stem);
+    let spans = trace.signals.iter().filter(of_stem).filter_map(motion_span_s);
+    let (from_s, to_s) = spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    Some(to_s - from_s)
+}
+
+/// When a position leaves its first value, and when it comes to its last.
+fn motion_span_s(signal: &Signal) -> Option<(f64, f64)> {
+    /// A tenth of a micrometre, or of a thousandth of a degree, is no motion.
+    const STILL: f64 = 1e-4;
+    let still = (10.0 * noise_of(&signal.values)).max(STILL);
+    let finite = |value: &&f64| value.is_finite();
+    let (first, last) = (*signal.values.iter().find(finite)?, *signal.values.iter().rfind(finite)?);
+    let from = signal.values.iter().position(|value| (value - first).abs() > still)?.saturating_sub(1);
+    let to = signal.values.iter().rposition(|value| (value - last).abs() > still)? + 1;
+    let series = Series::of(signal);
+    Some((series.time_s(from), series.time_s(to.min(signal.len() - 1))))
 }
 
 /// Figures of a pair in both views. `matches`: the path of the trace and where its samples belong on that of the reference.

@@ -6,7 +6,9 @@
 //! 1. coarse, over all shifts: mean velocities on a common grid (differences of positions at its edges), correlated by FFT and divided by
 //!    the energy of the overlap, so that a standstill counts for nothing and a trace that starts later finds its place;
 //! 2. fine: least squares of `trace(t) - reference(t + offset + drift t) - zero` by Gauss-Newton, with weights that drop to 0 for
-//!    what does not belong together (a dwell that is longer in one of them), which gives a fraction of a sample.
+//!    what does not belong together (a dwell that is longer in one of them), which gives a fraction of a sample. What is left is weighed with
+//!    the slope of the reference over some samples on either side of the place, not at it: noise of the reference is in its value and in its
+//!    slope at the place together, and would pull the offset towards where the interpolation smooths (errors in variables; an instrument).
 //!
 //! Does not choose the channels and does not stretch one trace to the other.
 
@@ -35,7 +37,7 @@ pub struct Alignment {
     pub drift_ratio: f64,
     /// Trace time at which the offset holds exactly.
     pub pivot_s: f64,
-    /// Standard error of the offset, were what is left noise.
+    /// Standard error of the offset, were what is left noise; 1 ns at least.
     pub uncertainty_s: f64,
     /// Correlation of the velocities on the common grid at this offset, 1 = alike.
     pub correlation_ratio: f64,
@@ -77,8 +79,15 @@ const FINE_ROUNDS_MAX: usize = 40;
 const REACH_S: f64 = 0.02;
 /// Steps of the offset below this end the fine step: far below any clock.
 const FINE_STEP_S: f64 = 1e-10;
+/// No offset is told better, however well the samples agree: no file has times that are.
+const FINEST_S: f64 = 1e-9;
 /// Tukey's constant: 95 % efficient for noise that is normal.
 const TUKEY: f64 = 4.685;
+/// Of what tells the offset the weights must leave this share; otherwise they are made wider, so often at most.
+const KEPT_MIN_SHARE: f64 = 0.02;
+const WIDER_ROUNDS_MAX: usize = 40;
+/// Samples of the reference from a place to where its slope is taken on either side: the cubic at the place reaches two.
+const BESIDE_SAMPLES: f64 = 4.0;
 /// Standard deviation of a normal variable over the middle of its magnitude.
 const SIGMA_PER_MEDIAN: f64 = 1.4826;
 
@@ -219,20 +228,23 @@ fn best_shift(a: &Binned, b: &Binned, product: &[f64]) -> Option<(i64, f64)> {
     chosen.map(|(k, ratio, _)| (k, ratio))
 }
 
-/// Sums of the normal equations of one round.
+/// Sums of the normal equations of one round: r = what is left, g = slope of the reference at the place, z = its slope over some samples on
+/// either side, t = time from the pivot; each times the weight w.
 #[derive(Clone, Copy, Default)]
 struct Normal {
-    /// Sums of w, w g, w g², w g t, w t g t, w r, w r g, w r g t over the samples, with g = slope of the reference, t = time from the pivot.
     w: f64,
-    wg: f64,
-    wgg: f64,
-    wgt: f64,
-    wggt: f64,
-    wggtt: f64,
-    wr: f64,
-    wrg: f64,
-    wrgt: f64,
-    wrr: f64,
+    r: f64,
+    rr: f64,
+    z: f64,
+    zt: f64,
+    g: f64,
+    gt: f64,
+    zz: f64,
+    zg: f64,
+    zgt: f64,
+    zgtt: f64,
+    zr: f64,
+    zrt: f64,
     samples: usize,
 }
 
@@ -270,55 +282,96 @@ fn refine(channels: &[Channel<'_>], coarse: Coarse, drift: bool) -> Alignment {
     best
 }
 
+/// One sample of a channel: what is left, slopes of the reference at and around its place, time from the pivot.
+struct Row {
+    r: f64,
+    g: f64,
+    z: f64,
+    t: f64,
+}
+
 /// One channel at the present alignment. The zero of the channel is eliminated: all sums are about the weighted means.
 fn normal_equations(channel: &Channel<'_>, at: &Alignment) -> Normal {
     let n = channel.trace.len();
     let stride = n.div_ceil(FINE_SAMPLES_MAX).max(1);
-    let mut cursor = channel.reference.cursor();
-    let mut rows: Vec<(f64, f64, f64)> = Vec::with_capacity(n / stride + 1);
+    let reference = channel.reference;
+    let beside_s = if reference.held { 0.0 } else { BESIDE_SAMPLES * reference.step_s().unwrap_or(0.0) };
+    let (mut cursor, mut before, mut behind) = (reference.cursor(), reference.cursor(), reference.cursor());
+    let mut rows: Vec<Row> = Vec::with_capacity(n / stride + 1);
+    let (mut zg, mut zz) = (0.0, 0.0);
     for i in (0..n).step_by(stride) {
         let t = channel.trace.time_s(i);
-        let (value, slope) = cursor.value_and_slope(at.reference_s(t));
+        let place_s = at.reference_s(t);
+        let (value, slope) = cursor.value_and_slope(place_s);
         let r = (channel.trace.values[i] - value) / channel.scale;
         if r.is_finite() && slope.is_finite() {
-            rows.push((r, slope / channel.scale, t - at.pivot_s));
+            let wide = (behind.value(place_s + beside_s) - before.value(place_s - beside_s)) / (2.0 * beside_s);
+            // At the ends, beside gaps and without a step there is only the slope at the place.
+            let z = if wide.is_finite() { wide } else { slope } / channel.scale;
+            let g = slope / channel.scale;
+            zg += z * g;
+            zz += z * z;
+            rows.push(Row { r, g, z, t: t - at.pivot_s });
         }
     }
     if rows.len() < 8 {
         return Normal::default();
     }
-    let mut sorted: Vec<f64> = rows.iter().map(|row| row.0).collect();
+    // What swings as fast as the samples beside say has no slope over them.
+    let tells = zg > 0.5 * zz;
+    if !tells {
+        rows.iter_mut().for_each(|row| row.z = row.g);
+    }
+    let mut sorted: Vec<f64> = rows.iter().map(|row| row.r).collect();
     let half = sorted.len() / 2;
     let centre = *sorted.select_nth_unstable_by(half, f64::total_cmp).1;
     // What is typical is judged where something moves: rests agree whatever the offset.
-    let moving = 0.1 * rows.iter().map(|row| row.1.abs()).fold(0.0, f64::max);
+    let moving = 0.1 * rows.iter().map(|row| row.z.abs()).fold(0.0, f64::max);
     let mut moved: Vec<f64> =
-        rows.iter().filter(|row| row.1.abs() > moving).map(|row| (row.0 - centre).abs()).collect();
+        rows.iter().filter(|row| row.z.abs() > moving).map(|row| (row.r - centre).abs()).collect();
     if moved.len() < 8 {
         return Normal::default();
     }
     let half = moved.len() / 2;
     // Never below rounding: what agrees exactly must not shut out everything else.
     let floor = 1e-12 * (1.0 + centre.abs());
-    let sigma = (SIGMA_PER_MEDIAN * *moved.select_nth_unstable_by(half, f64::total_cmp).1).max(floor);
+    let mut sigma = (SIGMA_PER_MEDIAN * *moved.select_nth_unstable_by(half, f64::total_cmp).1).max(floor);
+    let count = rows.len() as f64;
+    let (z, zz) = rows.iter().fold((0.0, 0.0), |(z, zz), row| (z + row.z, zz + row.z * row.z));
+    let told = KEPT_MIN_SHARE * (zz - z * z / count);
+    // Stretches of one speed agree exactly whatever the offset: what remains must tell it.
+    for _ in 0..WIDER_ROUNDS_MAX {
+        let sum = weighted(&rows, centre, sigma);
+        if sum.w > 0.0 && sum.zz - sum.z * sum.z / sum.w >= told {
+            return sum;
+        }
+        sigma *= 4.0;
+    }
+    weighted(&rows, centre, sigma)
+}
+
+/// Sums with Tukey's weights.
+fn weighted(rows: &[Row], centre: f64, sigma: f64) -> Normal {
     let mut sum = Normal::default();
-    for (r, g, t) in rows {
+    for &Row { r, g, z, t } in rows {
         let u = (r - centre) / (TUKEY * sigma);
         if u.abs() >= 1.0 {
             continue;
         }
         let w = (1.0 - u * u).powi(2);
-        let gt = g * t;
         sum.w += w;
-        sum.wg += w * g;
-        sum.wgg += w * g * g;
-        sum.wgt += w * gt;
-        sum.wggt += w * g * gt;
-        sum.wggtt += w * gt * gt;
-        sum.wr += w * r;
-        sum.wrg += w * r * g;
-        sum.wrgt += w * r * gt;
-        sum.wrr += w * r * r;
+        sum.r += w * r;
+        sum.rr += w * r * r;
+        sum.z += w * z;
+        sum.zt += w * z * t;
+        sum.g += w * g;
+        sum.gt += w * g * t;
+        sum.zz += w * z * z;
+        sum.zg += w * z * g;
+        sum.zgt += w * z * g * t;
+        sum.zgtt += w * z * g * t * t;
+        sum.zr += w * z * r;
+        sum.zrt += w * z * r * t;
         sum.samples += 1;
     }
     sum
@@ -326,35 +379,39 @@ fn normal_equations(channel: &Channel<'_>, at: &Alignment) -> Normal {
 
 /// Step of offset and drift, and the standard error of the offset; `None` without motion.
 fn solve(fit: &[Normal], drift: bool) -> Option<(f64, f64, f64)> {
-    let (mut gg, mut ggt, mut ggtt, mut rg, mut rgt, mut rr) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    // Rows: z, z t; columns: g, g t.
+    let (mut zz, mut zg, mut z_gt, mut zt_g, mut zt_gt, mut zr, mut zt_r, mut rr) =
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut weight, mut samples) = (0.0, 0_usize);
     for n in fit.iter().filter(|n| n.w > 0.0) {
-        gg += n.wgg - n.wg * n.wg / n.w;
-        ggt += n.wggt - n.wg * n.wgt / n.w;
-        ggtt += n.wggtt - n.wgt * n.wgt / n.w;
-        rg += n.wrg - n.wr * n.wg / n.w;
-        rgt += n.wrgt - n.wr * n.wgt / n.w;
-        rr += n.wrr - n.wr * n.wr / n.w;
+        zz += n.zz - n.z * n.z / n.w;
+        zg += n.zg - n.z * n.g / n.w;
+        z_gt += n.zgt - n.z * n.gt / n.w;
+        zt_g += n.zgt - n.zt * n.g / n.w;
+        zt_gt += n.zgtt - n.zt * n.gt / n.w;
+        zr += n.zr - n.z * n.r / n.w;
+        zt_r += n.zrt - n.zt * n.r / n.w;
+        rr += n.rr - n.r * n.r / n.w;
         weight += n.w;
         samples += n.samples;
     }
-    let moves = gg > 0.0;
+    let moves = zg > 0.0 && zz > 0.0;
     if !moves || samples < 8 {
         return None;
     }
     let (step_s, step_ratio) = if drift {
-        let determinant = gg * ggtt - ggt * ggt;
-        let separate = determinant > 1e-12 * gg * ggtt;
+        let determinant = zg * zt_gt - z_gt * zt_g;
+        let separate = determinant > 1e-12 * zg * zt_gt;
         if !separate {
             return None;
         }
-        ((rg * ggtt - rgt * ggt) / determinant, (rgt * gg - rg * ggt) / determinant)
+        ((zr * zt_gt - zt_r * z_gt) / determinant, (zt_r * zg - zr * zt_g) / determinant)
     } else {
-        (rg / gg, 0.0)
+        (zr / zg, 0.0)
     };
-    let left = (rr - step_s * rg - step_ratio * rgt).max(0.0) / weight;
+    let left = (rr - step_s * zr - step_ratio * zt_r).max(0.0) / weight;
     let steps_ok = step_s.is_finite() && step_ratio.is_finite();
-    steps_ok.then(|| (step_s, step_ratio, (left / gg).sqrt()))
+    steps_ok.then(|| (step_s, step_ratio, ((left * zz).sqrt() / zg).max(FINEST_S)))
 }
 
 /// Delay of one channel on top of an alignment (above 0: the reference is late), with its standard error; `None` where the signal does not

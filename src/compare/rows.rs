@@ -2,7 +2,7 @@
 //!
 //! In: circles, corners, budgets, lines, pairs. Out: cells. Numbers are rounded for reading; the JSON document has them whole. Does not lay out.
 
-use super::budget::{Budget, Part};
+use super::budget::{Budget, Part, ROUNDING_UM};
 use super::circle::CircleFigures;
 use super::comparison::PairFigures;
 use super::contour::Features;
@@ -15,6 +15,9 @@ use crate::base::units::{MS_PER_S, UM_PER_MM};
 const WORST_SHOWN: usize = 5;
 /// Lines whose times differ by less are not listed.
 const DIFFERENT_S: f64 = 5e-4;
+
+/// A figure that is smaller than this share of the largest difference is shown as 0.
+const ROUNDING_SHARE: f64 = 1e-9;
 
 /// Rows of cells.
 pub type Rows = Vec<Vec<String>>;
@@ -34,7 +37,12 @@ pub fn significant(value: f64) -> String {
 
 /// A length in mm as micrometres.
 pub fn um(value_mm: f64) -> String {
-    format!("{} µm", significant(value_mm * UM_PER_MM))
+    micrometres(value_mm * UM_PER_MM)
+}
+
+/// Rounding of coordinates is shown as 0.
+fn micrometres(value_um: f64) -> String {
+    format!("{} µm", significant(if value_um.abs() < ROUNDING_UM { 0.0 } else { value_um }))
 }
 
 /// Circles by ISO 230-4.
@@ -108,9 +116,9 @@ pub fn budget_rows(budget: &Budget) -> Rows {
     let mut rows = head(&["error", "rms", "max", "p95", "worst NC lines (µm)"]);
     for (name, part) in parts {
         let Some(part) = part else { continue };
-        let um = |value_um: f64| format!("{} µm", significant(value_um));
         let f = &part.figures;
-        rows.push(vec![name.to_owned(), um(f.rms), um(f.max), um(f.p95), worst_lines(part)]);
+        let [rms, max, p95] = [f.rms, f.max, f.p95].map(micrometres);
+        rows.push(vec![name.to_owned(), rms, max, p95, worst_lines(part)]);
     }
     rows
 }
@@ -151,13 +159,15 @@ pub fn pair_rows(
     let mut rows = head(&["signal", "rms", "max", "at", "p95", "bias", "correlation", "delay", "unit"]);
     for pair in pairs {
         let Some(figures) = get(pair) else { continue };
+        // Rounding of large values is no figure: against the largest difference it is nothing.
+        let told = |value: f64| significant(if value.abs() < ROUNDING_SHARE * figures.max { 0.0 } else { value });
         rows.push(vec![
             pair.name.clone(),
             significant(figures.rms),
             significant(figures.max),
             at(figures.max_at_s),
-            significant(figures.p95),
-            significant(figures.bias),
+            told(figures.p95),
+            told(figures.bias),
             figures.correlation_ratio.map_or(String::new(), |r| format!("{r:.5}")),
             pair.delay_s.map_or(String::new(), |(delay_s, _)| format!("{:.3} ms", delay_s * MS_PER_S)),
             pair.unit.clone(),

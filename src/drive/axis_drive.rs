@@ -34,11 +34,11 @@ pub struct DriveInput {
 /// Drive, motor and mechanics of one axis. Holds all of its state: a clone is a snapshot.
 #[derive(Clone, Debug)]
 pub struct AxisDrive {
-    jerk_filter: JerkFilter,
-    feedforward: Feedforward,
-    reversal: Reversal,
-    position_encoder: PositionEncoder,
-    position_loop: PositionLoop,
+    pub(super) jerk_filter: JerkFilter,
+    pub(super) feedforward: Feedforward,
+    pub(super) reversal: Reversal,
+    pub(super) position_encoder: PositionEncoder,
+    pub(super) position_loop: PositionLoop,
     pub(super) motor_encoder: MotorEncoder,
     pub(super) speed_loop: SpeedLoop,
     pub(super) current_loop: CurrentLoop,
@@ -50,7 +50,7 @@ pub struct AxisDrive {
     /// Boxed as the second mass is.
     pub(super) pitch_error: Option<Box<PitchError>>,
     pub(super) backlash: Option<Backlash>,
-    monitor: Monitor,
+    pub(super) monitor: Monitor,
     /// MD31040 = 0: the position is that of the motor.
     motor_measures: bool,
     /// MD32640.
@@ -58,7 +58,7 @@ pub struct AxisDrive {
     /// x_ref of the position cycle before.
     pub(super) reference_before_lu: f64,
     /// r.
-    transmission_lu_per_rad: f64,
+    pub(super) transmission_lu_per_rad: f64,
     /// n_p = T_p / T_v.
     pub(super) speed_ticks: u32,
     /// T_p.
@@ -350,15 +350,7 @@ impl AxisDrive {
         };
         let nominal_lu = self.transmission_lu_per_rad * self.load_angle_rad();
         let slope_ratio = self.pitch_error.as_ref().map_or(1.0, |error| error.velocity_ratio(nominal_lu));
-        let mut bits = 0;
-        for (set, flag) in [
-            (speed.clamped, flags::SPEED_CLAMP),
-            (torque.clamped, flags::CURRENT_LIMIT),
-            (voltage.clamped, flags::VOLTAGE_LIMIT),
-            (sticks, flags::STUCK),
-        ] {
-            bits |= if set { flag } else { 0 };
-        }
+        let bits = flags::of([speed.clamped, torque.clamped, voltage.clamped, sticks]);
         AxisSignals {
             position_setpoint_lu: input.position_setpoint_lu,
             position_reference_lu: position.reference_lu,

@@ -1,15 +1,14 @@
 //! Many drives in step: the axes of a machine, the parameter sets of a study.
 //!
-//! In: drives, one set-point each a position cycle. Out: the same signals, to the last bit, that each drive would give alone. What is done
-//! once in T_p (set-point, position loop, signals) stays in the drive; the inner loops of plain axes with the same cycles run side by side in
-//! a [`Block`]. One axis is bound by how long a number takes through the loops, several are bound by how many numbers the processor takes.
+//! In: drives, one set-point each a position cycle. Out: the same signals, to the last bit, that each drive would give alone. Plain axes with the
+//! same cycles run side by side in a [`Block`], which holds what they remember until somebody asks for the drives. One axis is bound by how long a number takes through the loops, several are bound by how many numbers the processor takes.
 //!
 //! An axis that is not plain (see `plain`) goes alone. Knows no threads: a caller has several batches.
 
 use super::axis_drive::{AxisDrive, DriveInput};
 use super::block::Block;
 use super::choice::Drive;
-use super::plain::{Cycles, PlainParts, Prepared};
+use super::plain::Cycles;
 use super::wire::AxisSignals;
 
 /// Axes in a block of a study, and in one of a machine with few axes.
@@ -80,49 +79,69 @@ struct Together<const N: usize> {
 impl<D: Steps> DriveBatch<D> {
     /// Takes the drives; their order stays.
     pub fn new(drives: Vec<D>) -> Self {
-        let mut groups: Vec<(Cycles, Vec<(usize, PlainParts)>)> = Vec::new();
+        let mut groups: Vec<(Cycles, Vec<usize>)> = Vec::new();
         let mut alone = Vec::new();
         for (place, drive) in drives.iter().enumerate() {
-            let Some(parts) = drive.cascade().and_then(AxisDrive::plain_parts) else {
+            let Some(plain) = drive.cascade().filter(|drive| drive.is_plain()) else {
                 alone.push(place);
                 continue;
             };
-            match groups.iter_mut().find(|(cycles, _)| *cycles == parts.cycles) {
-                Some((_, group)) => group.push((place, parts)),
-                None => groups.push((parts.cycles, vec![(place, parts)])),
+            let cycles = plain.cycles();
+            match groups.iter_mut().find(|(others, _)| *others == cycles) {
+                Some((_, group)) => group.push(place),
+                None => groups.push((cycles, vec![place])),
             }
         }
         let (mut wide, mut narrow) = (Vec::new(), Vec::new());
         for (_, group) in &groups {
-            let (many, few) =
-                group.split_at(group.len() - if group.len() % WIDE <= NARROW { group.len() % WIDE } else { 0 });
-            wide.extend(many.chunks(WIDE).filter_map(Together::new));
+            let rest = group.len() % WIDE;
+            let (many, few) = group.split_at(group.len() - if rest <= NARROW { rest } else { 0 });
+            wide.extend(many.chunks(WIDE).filter_map(|places| Together::new(&drives, places)));
             match few {
-                [(place, _)] => alone.push(*place),
-                few => narrow.extend(Together::new(few)),
+                [place] => alone.push(*place),
+                few => narrow.extend(Together::new(&drives, few)),
             }
         }
         Self { drives, wide, narrow, alone }
     }
 
-    /// The drives, as they stand.
-    pub fn drives(&self) -> &[D] {
-        &self.drives
+    /// From now on without the instructions that only some processors have (AVX2). Slower; not a bit of a result changes, which a test holds.
+    pub fn on_any_processor(mut self) -> Self {
+        self.wide.iter_mut().for_each(|together| together.block.on_any_processor());
+        self.narrow.iter_mut().for_each(|together| together.block.on_any_processor());
+        self
     }
 
-    /// The drives, for what one of them does by itself: a batch keeps nothing of them between two steps.
+    /// The drives as they stand, for what one of them does by itself.
     pub fn drives_mut(&mut self) -> &mut [D] {
-        &mut self.drives
+        let Self { drives, wide, narrow, .. } = self;
+        wide.iter_mut().for_each(|together| together.part(drives));
+        narrow.iter_mut().for_each(|together| together.part(drives));
+        drives
     }
 
     /// Takes them apart again.
-    pub fn into_drives(self) -> Vec<D> {
+    pub fn into_drives(mut self) -> Vec<D> {
+        self.drives_mut();
         self.drives
     }
 
     /// How many of them go together.
     pub fn together(&self) -> usize {
         self.drives.len() - self.alone.len()
+    }
+
+    /// One of them has a cascade: not all are ideal.
+    pub fn has_cascade(&self) -> bool {
+        self.drives.iter().any(|drive| drive.cascade().is_some())
+    }
+
+    /// See [`AxisDrive::is_finite`]. A place without a cascade is.
+    pub fn is_finite(&self, place: usize) -> bool {
+        let wide = self.wide.iter().find_map(|together| together.is_finite(place));
+        let held = wide.or_else(|| self.narrow.iter().find_map(|together| together.is_finite(place)));
+        let drive = self.drives.get(place).and_then(Steps::cascade);
+        held.unwrap_or_else(|| drive.is_none_or(AxisDrive::is_finite))
     }
 
     /// One position cycle of every drive with its input (missing ones: the drive waits); `show` gets the place of a drive and its signals
@@ -163,42 +182,72 @@ fn step_one<D: Steps>(
 
 impl<const N: usize> Together<N> {
     /// `None` without any.
-    fn new(group: &[(usize, PlainParts)]) -> Option<Self> {
-        let parts: Vec<PlainParts> = group.iter().map(|(_, parts)| *parts).collect();
-        let places = group.iter().map(|(place, _)| *place).collect();
-        Some(Self { places, block: Block::new(&parts)? })
+    fn new<D: Steps>(drives: &[D], places: &[usize]) -> Option<Self> {
+        let plain: Vec<&AxisDrive> = places.iter().filter_map(|place| drives[*place].cascade()).collect();
+        Some(Self { places: places.to_vec(), block: Block::new(&plain)? })
+    }
+
+    /// Brings home what the block holds.
+    fn part<D: Steps>(&mut self, drives: &mut [D]) {
+        if self.block.holds() {
+            for (axis, place) in self.places.iter().enumerate() {
+                if let Some(drive) = drives[*place].cascade_mut() {
+                    self.block.give_back(axis, drive);
+                }
+            }
+        }
+    }
+
+    /// All of them into the block, if they can go together.
+    fn join<D: Steps>(&mut self, drives: &mut [D]) -> bool {
+        let plain = |place: &usize| drives[*place].cascade().is_some_and(AxisDrive::is_plain);
+        if self.block.holds() {
+            return true;
+        }
+        if !self.places.iter().all(plain) {
+            return false;
+        }
+        for (axis, place) in self.places.iter().enumerate() {
+            if let Some(drive) = drives[*place].cascade_mut() {
+                self.block.take(axis, drive);
+            }
+        }
+        true
     }
 
     /// Together when all have an input, else one by one.
+    #[inline]
     fn step<D: Steps>(
         &mut self,
         drives: &mut [D],
         input: &impl Fn(usize) -> Option<DriveInput>,
         show: &mut impl FnMut(usize, &AxisSignals),
     ) {
-        if !self.places.iter().all(|place| input(*place).is_some()) {
+        if !self.places.iter().all(|place| input(*place).is_some()) || !self.join(drives) {
+            self.part(drives);
             for place in &self.places {
                 step_one(drives, *place, input, show);
             }
             return;
         }
-        let mut prepared: [Option<Prepared>; N] = [None; N];
-        for (axis, place) in self.places.iter().enumerate() {
-            if let (Some(drive), Some(input)) = (drives[*place].cascade_mut(), input(*place)) {
-                let ready = drive.prepare(input);
-                show(*place, &drive.first_signals(&ready));
-                self.block.begin(axis, &ready, &drive.inner_memory());
-                prepared[axis] = Some(ready);
+        let Self { places, block } = self;
+        for (axis, place) in places.iter().enumerate() {
+            if let Some(input) = input(*place) {
+                block.begin(axis, &input);
             }
         }
-        self.block.run();
-        for (axis, (ready, place)) in prepared.iter().zip(&self.places).enumerate() {
-            if let (Some(ready), Some(drive)) = (ready, drives[*place].cascade_mut()) {
-                match self.block.end(axis) {
-                    Some((memory, current_sum_a)) => drive.finish(ready, &memory, current_sum_a),
-                    None => drive.go_alone(ready),
-                }
+        block.step(|axis, signals| {
+            if let Some(place) = places.get(axis) {
+                show(*place, signals);
             }
+        });
+    }
+
+    /// Of a drive whose state is here.
+    fn is_finite(&self, place: usize) -> Option<bool> {
+        if !self.block.holds() {
+            return None;
         }
+        self.places.iter().position(|other| *other == place).map(|axis| self.block.is_finite(axis))
     }
 }

@@ -28,9 +28,13 @@ impl DelayLine {
     }
 
     /// Takes s\[k\], gives D(s)\[k\].
-    #[inline]
+    #[inline(always)]
     pub(super) fn step(&mut self, sample: f64) -> f64 {
         let length = self.samples.len();
+        // No delay: what is in the ring is never asked for.
+        if length == 2 && self.fraction_ratio == 0.0 {
+            return sample;
+        }
         self.newest = if self.newest + 1 == length { 0 } else { self.newest + 1 };
         self.samples[self.newest] = sample;
         // The ring holds s[k] ... s[k-n-1]: the oldest is the next place, the one before it in time-order follows.

@@ -41,6 +41,7 @@ impl Balance {
         }
     }
 
+    #[inline(always)]
     fn step(&mut self, setpoint_lu: f64) -> f64 {
         match self {
             Self::DeadTime(line) => line.step(setpoint_lu),
@@ -104,7 +105,7 @@ impl Feedforward {
 
     /// One position cycle. `active = false` (FFWOF): both weights are 0 in this cycle; the delay lines go on, so that FFWON
     /// finds them filled, and the balancing delay stays.
-    #[inline]
+    #[inline(always)]
     pub(super) fn terms(&mut self, setpoint_lu: f64, active: bool) -> Terms {
         let velocity_lu_s = (setpoint_lu - self.setpoint_before_lu) / self.period_s;
         let acceleration_lu_s2 = (velocity_lu_s - self.velocity_before_lu_s) / self.period_s;

@@ -51,11 +51,16 @@ pub(super) fn integrals<const N: usize>(
     for k in 1..SERIES_TERMS {
         let scale_s = h / f64::from(k + 1);
         term = product(a, term).map(|row| row.map(|value| value * scale_s));
+        let before = (f, g);
         for row in 0..N {
             for column in 0..N {
                 f[row][column] += term[row][column];
             }
             g[row] += term[integrated][row] * h / f64::from(k + 2);
+        }
+        // Later terms are smaller still. The first N may be 0 in an entry that the others reach.
+        if k as usize > N && (f, g) == before {
+            break;
         }
     }
 

@@ -8,6 +8,7 @@
 //! hundred ticks in any real drive: then the acceleration changes its sign at most once in a tick and no stop is overlooked.
 
 use super::integral::falling_zero;
+use super::limit::limited;
 use super::transition::{Excess, Slopes, Transition};
 use crate::machine::{DriveData, MechanicsData, MotorData};
 
@@ -91,20 +92,22 @@ impl Plant {
     /// The axis sticks: at rest, and motor and gravity do not overcome the breakaway torque. Without dry friction never.
     #[inline(always)]
     pub fn sticks(&self, state: PlantState, gravity_n_m: f64) -> bool {
-        let drive_n_m = self.motor.torque_constant_n_m_per_a * state.current_a - gravity_n_m;
-        state.speed_rad_s == 0.0 && self.has_dry_friction && drive_n_m.abs() <= self.mechanics.breakaway_friction_n_m
+        self.friction().sticks(state, gravity_n_m)
     }
 
     /// t_fric: Tc sgn w + B w; at rest what balances motor and gravity, up to ±Ts.
+    #[inline(always)]
     pub fn friction_n_m(&self, state: PlantState, gravity_n_m: f64) -> f64 {
-        let MechanicsData { viscous_friction_n_m_s_per_rad: viscous, coulomb_friction_n_m: coulomb, .. } =
-            self.mechanics;
-        let w = state.speed_rad_s;
-        if w == 0.0 {
-            let drive_n_m = self.motor.torque_constant_n_m_per_a * state.current_a - gravity_n_m;
-            super::limit::limited(drive_n_m, self.mechanics.breakaway_friction_n_m)
-        } else {
-            coulomb.copysign(w) + viscous * w
+        self.friction().torque_n_m(state, gravity_n_m)
+    }
+
+    #[inline(always)]
+    pub(super) fn friction(&self) -> Friction {
+        Friction {
+            torque_constant_n_m_per_a: self.motor.torque_constant_n_m_per_a,
+            viscous_n_m_s_per_rad: self.mechanics.viscous_friction_n_m_s_per_rad,
+            coulomb_n_m: self.mechanics.coulomb_friction_n_m,
+            breakaway_n_m: self.mechanics.breakaway_friction_n_m,
         }
     }
 
@@ -230,6 +233,37 @@ impl Plant {
     #[inline(always)]
     fn excess(&self, state: PlantState, voltage_v: f64, against_n_m: f64) -> Excess {
         Slopes::of(&self.motor, &self.mechanics).excess(state, voltage_v, against_n_m)
+    }
+}
+
+/// What the friction of an axis is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Friction {
+    /// Kt.
+    pub(super) torque_constant_n_m_per_a: f64,
+    /// B.
+    pub(super) viscous_n_m_s_per_rad: f64,
+    /// Tc.
+    pub(super) coulomb_n_m: f64,
+    /// Ts.
+    pub(super) breakaway_n_m: f64,
+}
+
+impl Friction {
+    /// See [`Plant::sticks`].
+    #[inline(always)]
+    pub(super) fn sticks(&self, state: PlantState, gravity_n_m: f64) -> bool {
+        let drive_n_m = self.torque_constant_n_m_per_a * state.current_a - gravity_n_m;
+        (state.speed_rad_s == 0.0) & (self.breakaway_n_m > 0.0) & (drive_n_m.abs() <= self.breakaway_n_m)
+    }
+
+    /// See [`Plant::friction_n_m`].
+    #[inline(always)]
+    pub(super) fn torque_n_m(&self, state: PlantState, gravity_n_m: f64) -> f64 {
+        let w = state.speed_rad_s;
+        let at_rest_n_m = limited(self.torque_constant_n_m_per_a * state.current_a - gravity_n_m, self.breakaway_n_m);
+        let moving_n_m = self.coulomb_n_m.copysign(w) + self.viscous_n_m_s_per_rad * w;
+        if w == 0.0 { at_rest_n_m } else { moving_n_m }
     }
 }
 

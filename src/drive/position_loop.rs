@@ -22,13 +22,13 @@ pub(super) struct SpeedCommand {
 #[derive(Clone, Debug)]
 pub(super) struct PositionLoop {
     /// Kv.
-    gain_per_s: f64,
+    pub(super) gain_per_s: f64,
     /// v_max.
-    velocity_max_lu_s: f64,
+    pub(super) velocity_max_lu_s: f64,
     /// r.
-    transmission_lu_per_rad: f64,
+    pub(super) transmission_lu_per_rad: f64,
     /// After an alarm: the speed set-point, and what it loses each second. In place of the position.
-    braking: Option<[f64; 2]>,
+    pub(super) braking: Option<[f64; 2]>,
 }
 
 impl PositionLoop {
@@ -56,7 +56,7 @@ impl PositionLoop {
     }
 
     /// One position cycle.
-    #[inline]
+    #[inline(always)]
     pub(super) fn step(&self, reference_lu: f64, measured_lu: f64, velocity_feedforward_lu_s: f64) -> SpeedCommand {
         let deviation_lu = reference_lu - measured_lu;
         let wanted_lu_s = self.gain_per_s * deviation_lu + velocity_feedforward_lu_s;

@@ -76,6 +76,14 @@ pub mod flags {
     pub const VOLTAGE_LIMIT: u32 = 4;
     /// The axis sticks.
     pub const STUCK: u32 = 8;
+
+    /// The bits for which the limits hold: speed, current, voltage; and stuck.
+    #[inline(always)]
+    pub(crate) fn of(holds: [bool; 4]) -> u32 {
+        let [speed, current, voltage, stuck] = holds;
+        let bit = |holds: bool, flag: u32| if holds { flag } else { 0 };
+        bit(speed, SPEED_CLAMP) | bit(current, CURRENT_LIMIT) | bit(voltage, VOLTAGE_LIMIT) | bit(stuck, STUCK)
+    }
 }
 
 /// How a drive starts.

@@ -36,10 +36,12 @@ use std::sync::Arc;
 
 mod checks;
 mod flowing;
+mod ramping_feed;
 mod with_spindle;
 mod waits;
 
 use checks::{check_flow, check_motion, check_time};
+pub(super) use ramping_feed::Ramp;
 use waits::Waits;
 
 /// Plans speeds over a window of the path.
@@ -75,6 +77,10 @@ pub struct Planner {
     spindle: Spindle,
     /// The thread that was pushed last, if the path does not rest after it.
     last_thread: Option<Before>,
+    /// The ramp of the spindle that pieces with F a revolution are still to follow.
+    ramp: Option<Ramp>,
+    /// The path rests where the first piece begins.
+    rests_now: bool,
     /// What a person should know, with its block.
     findings: Vec<(BlockRef, Diagnostic)>,
     /// A spindle that cannot follow a constant cutting speed has been told of.
@@ -165,6 +171,8 @@ impl Planner {
             arrivals: Arrivals::new(),
             spindle: Spindle::new(machine.spindle),
             last_thread: None,
+            ramp: None,
+            rests_now: true,
             findings: Vec::new(),
             late_told: false,
             waits: Waits::default(),
@@ -219,8 +227,13 @@ impl Planner {
         stretches.into_iter().try_for_each(|stretch| self.push_constant(stretch))
     }
 
-    /// A piece whose F is the same all along.
-    fn push_constant(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
+    /// A piece whose F is the same all along, unless it follows the ramp of the spindle.
+    fn push_constant(&mut self, mut path: JointPath) -> Result<(), Box<Diagnostic>> {
+        self.wait_for_spindle(&mut path);
+        self.ramp_stretches(path).into_iter().try_for_each(|stretch| self.push_stretch(stretch))
+    }
+
+    fn push_stretch(&mut self, path: JointPath) -> Result<(), Box<Diagnostic>> {
         let polynomial = matches!(path.contour.curve(), Some(Curve::Polynomial(_) | Curve::Quintic(_)));
         let scanned = polynomial || !path.is_contour();
         // A length that is no number is refused as it is.
@@ -235,8 +248,7 @@ impl Planner {
     }
 
     fn push_part(&mut self, part: Part) -> Result<(), Box<Diagnostic>> {
-        let Part { mut path, worst } = part;
-        self.wait_for_spindle(&mut path);
+        let Part { path, worst } = part;
         let contour = &path.contour;
         let mut rests_after = contour.stop_at_end;
         let mut corner = FREE;
@@ -310,6 +322,7 @@ impl Planner {
         if self.admitted == 0 || self.held.is_some() || !(self.full || self.finished || self.rests > 0) {
             return None;
         }
+        self.follow_ramp();
         let waits_at_end = self.waits_at_end()?;
         self.actions.begin(&self.entries.front()?.path, self.elapsed_s);
         let flowing = self.flow();
@@ -365,6 +378,7 @@ impl Planner {
         self.changed_from = self.changed_from.saturating_sub(1);
         self.full = false;
         self.rests -= usize::from(front.rests_after);
+        self.rests_now = front.rests_after || (self.rests_now && matches!(front.motion, Motion::Nothing));
         if self.admitted > 0 {
             let next = &self.entries[0];
             self.blocks_beyond -= next.blocks();

@@ -6,6 +6,8 @@
 //!   change a radian times the square of the speed (0 for G33). The axis cannot be there from rest at once: it sets out earlier, so that its run-in meets
 //!   that line with the speed and acceleration of the line. Where the axis is on the line depends on the angle alone, whatever the speed and the
 //!   acceleration. The run-out is the same mirrored: it ends at the end of the block, at rest. Both lie inside the thread.
+//! * DITS and DITE make run-in and run-out as long as they say, with less acceleration and jerk. Where they are shorter than the limits of the axes allow the limits
+//!   hold (the control overloads the axis and shows alarm 22280): the planner says so.
 //! * A block that goes on from a thread begins on its own line; only the last one runs out.
 //! * Tap: from rest to rest, within axes, S and the acceleration of the spindle.
 //! * A block that is too short for run-in and run-out is driven from rest to rest, never on the line: the planner says so.
@@ -149,9 +151,10 @@ impl ThreadPiece {
         let speed_rad_s = if turning.speed_rad_s == 0.0 { self.thread.speed_rad_s } else { turning.speed_rad_s.abs() };
         let [first, last] = [0.0, self.length_lu].map(|s_lu| line_at(&self.thread, s_lu, speed_rad_s));
         let whole_s = 2.0 * self.length_lu / (first.velocity_lu_s + last.velocity_lu_s);
-        let entering = if self.goes_on { Some(None) } else { self.run(first).map(Some) };
+        let [run_in_lu, run_out_lu] = self.thread.runs_mm;
+        let entering = if self.goes_on { Some(None) } else { self.run(first, run_in_lu).map(Some) };
         let mirrored = Line { acceleration_lu_s2: -last.acceleration_lu_s2, ..last };
-        let leaving = if leaves { self.run(mirrored).map(Some) } else { Some(None) };
+        let leaving = if leaves { self.run(mirrored, run_out_lu).map(Some) } else { Some(None) };
         let (Some(entering), Some(leaving)) = (entering, leaving) else {
             return (self.unsynchronised(turning, first), false);
         };
@@ -208,8 +211,43 @@ impl ThreadPiece {
         TimeLaw::new(standing(turning.ready_s - turning.now_s).into_iter().chain(law.phases().iter().copied()))
     }
 
-    /// From rest to a line, from its start on; `None`: it is left behind for good.
-    fn run(&self, line: Line) -> Option<Run> {
+    /// The runs that are programmed shorter than the limits of the axes allow, with what they need: programmed and needed.
+    pub fn short_runs_lu(&self, leaves: bool) -> [Option<[f64; 2]>; 2] {
+        let [first, last] = [0.0, self.length_lu].map(|s_lu| line_at(&self.thread, s_lu, self.thread.speed_rad_s));
+        let mirrored = Line { acceleration_lu_s2: -last.acceleration_lu_s2, ..last };
+        let short = |line: Line, run_lu: Option<f64>| {
+            let least_lu = self.run(line, None)?.length_lu;
+            run_lu.filter(|run_lu| *run_lu < least_lu).map(|run_lu| [run_lu, least_lu])
+        };
+        let [run_in_lu, run_out_lu] = self.thread.runs_mm;
+        [short(first, run_in_lu.filter(|_| !self.goes_on)), short(mirrored, run_out_lu.filter(|_| leaves))]
+    }
+
+    /// From rest to a line, from its start on, as long as programmed or as short as possible; `None`: it is left behind for good.
+    fn run(&self, line: Line, run_lu: Option<f64>) -> Option<Run> {
+        let shortest = self.shortest_run(line)?;
+        let Some(run_lu) = run_lu.filter(|run_lu| *run_lu > shortest.length_lu && run_lu.is_finite()) else {
+            return Some(shortest);
+        };
+        // With a share of the acceleration and its square of the jerk the run takes its inverse in time, and in way where the line is straight.
+        let slower = |share: f64| {
+            let mut piece = self.clone();
+            piece.bounds.dynamics.acceleration_lu_s2 *= share;
+            piece.bounds.dynamics.jerk_lu_s3 = piece.bounds.dynamics.jerk_lu_s3.map(|jerk| jerk * share * share);
+            piece.shortest_run(line)
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            match slower(middle) {
+                Some(run) if run.length_lu <= run_lu => high = middle,
+                _ => low = middle,
+            }
+        }
+        slower(high)
+    }
+
+    fn shortest_run(&self, line: Line) -> Option<Run> {
         let length = |tau: f64| tau * (line.velocity_lu_s + tau * line.acceleration_lu_s2 / 2.0);
         let run_to =
             |tau: f64| self.run_to(line.velocity_lu_s + tau * line.acceleration_lu_s2, line.acceleration_lu_s2, tau);
@@ -262,7 +300,7 @@ impl ThreadPiece {
             let first = line_at(&self.thread, 0.0, share * speed_rad_s);
             let mirrored = Line { acceleration_lu_s2: -last.acceleration_lu_s2, ..last };
             let whole_s = 2.0 * self.length_lu / (first.velocity_lu_s + last.velocity_lu_s);
-            self.run(mirrored).is_some_and(|run| run.meets_s <= whole_s)
+            self.run(mirrored, self.thread.runs_mm[1]).is_some_and(|run| run.meets_s <= whole_s)
         };
         let limit = self.bounds.acceleration;
         if fits(1.0) {

@@ -52,10 +52,10 @@ pub(super) fn folding(
         sampled.push(Motion::from_series(&position, &at_tick, true, record.period_s, r));
         meant.push(Motion::from_series(&position, &mean, false, record.period_s, r));
     }
-    let inertia = |motions: &[Motion], folded: bool| {
+    let inertia = |motions: &[Motion]| {
         let mut unused = AxisResult::new(&axis.name);
-        one_shot(motions, axis, folded, &mut unused).value(Parameter::Inertia)
+        one_shot(motions, axis, &mut unused).value(Parameter::Inertia)
     };
-    let inertia_ratio = inertia(&sampled, true)? / inertia(&meant, false)?;
+    let inertia_ratio = inertia(&sampled)? / inertia(&meant)?;
     (inertia_ratio.is_finite() && inertia_ratio > 0.2).then_some(Folding { inertia_ratio })
 }

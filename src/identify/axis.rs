@@ -177,7 +177,7 @@ fn mechanics(
         return Mechanics::default();
     };
     result.verdicts.push(format!("torque from: {}; position from: {}", source.title(), of_best[0].position_from));
-    let mut found = one_shot(&motions, axis, source.is_folded(), result);
+    let mut found = one_shot(&motions, axis, result);
     if source.is_folded() {
         unfold(&mut found, &of_best, machine, axis, data, source, result);
     }

@@ -3,10 +3,11 @@
 //! In: [`Motion`]s of one axis. Out: [`Mechanics`]: values in SI units at the motor with 95 % intervals, refusals, what the law leaves over.
 //!
 //! ```text
-//! τ = J w' + B w + Tc sgn w + g0 + gs sin x + gc cos x            rows near a standstill are left out
+//! τ = J (w' - d w'') + B w + Tc sgn w + g0 + gs sin x + gc cos x            rows near a standstill are left out
 //! ```
+//! d is how late the torque stands behind the position in the trace.
 //! The interval has two parts. The first is that of the noise (`normal`). The second is that of the law: terms that it does not have
-//! (friction that falls with speed or grows with its square, another viscosity in each direction, a torque that is early or late, a spring
+//! (friction that falls with speed or grows with its square, another viscosity in each direction, a spring
 //! behind the motor) are tried one by one and together, and by as much as a significant one moves a value, its interval is widened. Does not
 //! correct values by such terms: a drive model that has no place for them could not hold them.
 
@@ -14,7 +15,7 @@ use super::motion::Motion;
 use super::normal::{Blocks, Solution};
 use super::wire::{AxisResult, Estimate, Figure, Means, Parameter};
 use crate::base::AxisKind;
-use crate::base::units::{percent_from_ratio, rad_from_deg};
+use crate::base::units::{MS_PER_S, percent_from_ratio, rad_from_deg};
 use crate::machine::Axis;
 use nalgebra::DVector;
 
@@ -33,23 +34,26 @@ const ONE_SIDED: usize = 12;
 const WIDTH: usize = 13;
 
 /// Terms that the law does not have, and what one that is there means.
-const ALTERNATIVES: [(usize, &str); 7] = [
+const ALTERNATIVES: [(usize, &str); 6] = [
     (STRIBECK[0], "friction is higher at low speed (Stribeck)"),
     (STRIBECK[1], "friction is higher at low speed (Stribeck)"),
     (STRIBECK[2], "friction is higher at low speed (Stribeck)"),
     (SQUARE, "friction bends with speed"),
     (ONE_SIDED, "friction grows differently in the two directions"),
-    (SHIFT, "torque and position are not sampled at the same instant"),
     (SPRING, "motor and scale do not move as one body (elastic drive train)"),
 ];
 /// Speeds of the Stribeck terms, as shares of the highest.
 const STRIBECK_SHARES: [f64; 3] = [0.02, 0.05, 0.15];
-/// Standard errors from which an alternative counts.
-const SIGNIFICANT: f64 = 2.6;
-/// How much of the shift by an alternative an interval takes in.
-const SHIFT_TAKEN: f64 = 1.5;
+/// Standard errors from which an alternative counts: six are tried, and in one trace of twenty that follows the law one of them may count by
+/// chance (0.05 / 6 two-sided).
+const SIGNIFICANT: f64 = 2.64;
+/// Standard errors on each side of a 95 % interval.
+const HALF_95: f64 = 1.96;
+/// How much of the shift by an alternative an interval takes in: the true law is neither of the two, and how far they lie apart counts as one standard
+/// error of what the law leaves out.
+const SHIFT_TAKEN: f64 = HALF_95;
 /// What differences at the position cycle do to the values at most, found on traces without noise.
-const METHOD_SHARE: f64 = 1e-3;
+const METHOD_SHARE: f64 = 3e-4;
 /// Length of a block: many times the window and the memory of a speed loop.
 const BLOCK_S: (f64, f64) = (0.25, 2.0);
 /// Blocks aimed at.
@@ -162,11 +166,11 @@ fn row(motion: &Motion, k: usize, speed_max_rad_s: f64) -> [f64; WIDTH] {
 }
 
 /// Fits the law; refusals, figures and verdicts go into `result`.
-pub(super) fn one_shot(motions: &[Motion], axis: &Axis, folded: bool, result: &mut AxisResult) -> Mechanics {
+pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult) -> Mechanics {
     let all = covered(motions);
     let moving_s = all.direction_s[0] + all.direction_s[1];
     let mut found = Mechanics { moving_s, ..Mechanics::default() };
-    let Some((columns, both)) = columns(&all, axis, folded, result) else { return found };
+    let Some((columns, both)) = columns(&all, axis, result) else { return found };
     let Some(solution) = all.blocks.solve(&columns) else {
         refuse_all(result, "its motion does not tell inertia, friction and speed apart", PLAN);
         return found;
@@ -182,7 +186,7 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, folded: bool, result: &m
             continue;
         };
         let (value, noise) = solution.value(place);
-        let half = noise.hypot(METHOD_SHARE * value) + SHIFT_TAKEN * shifts[place];
+        let half = noise.hypot(METHOD_SHARE * value).hypot(SHIFT_TAKEN * shifts[place]);
         let estimate = Estimate::around(parameter, value, half, Means::OneShot);
         match verdict(&estimate, &all, solution.stretches[place], found.value(Parameter::Coulomb)) {
             None => found.estimates.push(estimate),
@@ -190,6 +194,7 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, folded: bool, result: &m
         }
     }
     figures(&all, &columns, &solution, both, result);
+    late(&columns, &solution, motions, result);
     points(motions, &columns, &solution.theta, result);
     found
 }
@@ -204,7 +209,7 @@ fn refuse_all(result: &mut AxisResult, reason: &str, remedy: &str) {
 }
 
 /// Which columns the motion can tell apart, and whether it goes both ways.
-fn columns(all: &Covered, axis: &Axis, folded: bool, result: &mut AxisResult) -> Option<(Vec<usize>, bool)> {
+fn columns(all: &Covered, axis: &Axis, result: &mut AxisResult) -> Option<(Vec<usize>, bool)> {
     let [forward_s, backward_s] = all.direction_s;
     let moving_s = forward_s + backward_s;
     if all.blocks.rows() < 10 * WIDTH || moving_s < 2.0 * DIRECTION_S {
@@ -246,10 +251,9 @@ fn columns(all: &Covered, axis: &Axis, folded: bool, result: &mut AxisResult) ->
             }
         }
     }
-    if folded {
-        // A sample at the tick is not the mean of the cycle around it: it may be early or late.
-        columns.push(SHIFT);
-    }
+    // Torque and position of a trace are never quite of one instant: a mean of samples is late by half a current cycle, a sample at the tick may be
+    // early or late, and two clocks may stand apart.
+    columns.push(SHIFT);
     Some((columns, both))
 }
 
@@ -286,8 +290,7 @@ fn misfits(blocks: &Blocks, columns: &[usize], law: &Solution, verdicts: &mut Ve
         one.push(*column);
         let Some(solution) = blocks.solve(&one) else { continue };
         let (value, half) = solution.value(columns.len());
-        // A 95 % interval is some two standard errors wide on each side.
-        if value.abs() <= SIGNIFICANT / 2.0 * half {
+        if value.abs() <= SIGNIFICANT / HALF_95 * half {
             continue;
         }
         let largest = take(&solution);
@@ -356,6 +359,22 @@ fn verdict(estimate: &Estimate, all: &Covered, stretches: f64, coulomb: Option<f
         _ => None,
     }
 }
+
+/// How late the torque stands behind the position: τ(t - d) is J w' - d J w''.
+fn late(columns: &[usize], solution: &Solution, motions: &[Motion], result: &mut AxisResult) {
+    let Some(shift) = columns.iter().position(|column| *column == SHIFT) else { return };
+    let (late_s, half_s) = solution.function(shift, |theta| -theta[shift] / theta[0]);
+    let period_s = motions.iter().map(|motion| motion.period_s).fold(0.0, f64::max);
+    if late_s.abs() > half_s.max(LATE_SHARE * period_s) {
+        let (late_ms, half_ms) = (late_s * MS_PER_S, half_s * MS_PER_S);
+        result.verdicts.push(format!(
+            "the torque stands {late_ms:.2} ms (±{half_ms:.2}) behind the position in this trace: that is taken out of the mechanics"
+        ));
+    }
+}
+
+/// Share of the cycle from which that is said.
+const LATE_SHARE: f64 = 0.25;
 
 /// Torque of each direction, and of the one direction where there is only one.
 fn figures(all: &Covered, columns: &[usize], solution: &Solution, both: bool, result: &mut AxisResult) {

@@ -4,21 +4,26 @@
 //! [`AxisResult`]s: [`Estimate`]s and [`Refusal`]s, keyed like the machine file. What a trace must hold, the method and its formulas stand in
 //! docs/identify.md, in the order of the files here: `record` reads one axis of a trace, `motion` filters it without a shift in time,
 //! `normal` solves least squares in blocks (intervals from leaving blocks out), `friction` and `staged` fit the mechanics, `aliasing`
-//! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` writes the programs to record. `profile` and `control`
-//! calibrate the control: corner smoothing and time law from the set-points of a program.
+//! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` and
+//! `plan_control` write the programs to record. `profile`, `knobs`,
+//! `search`, `choose` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
 //! Does not tune anything, and takes nothing from a machine file that it says it has identified.
 
 mod aliasing;
 mod axis;
+mod choose;
 mod control;
 mod feedforward;
 mod friction;
+mod knobs;
 mod motion;
 mod normal;
 mod plan;
+mod plan_control;
 mod profile;
 mod record;
 mod refine;
+mod search;
 mod speed_loop;
 mod staged;
 mod wire;

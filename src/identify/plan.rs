@@ -1,9 +1,10 @@
 //! Motions that tell everything: NC programs for a machine to run while it is traced.
 //!
-//! In: the machine. Out: [`PlannedProgram`]s, one an axis and a circle for two linear axes, each with `$AN_SLTRACE = 1` and `= 2` around
+//! In: the machine. Out: [`PlannedProgram`]s, one an axis, a circle for two linear axes and one for the control, each with `$AN_SLTRACE = 1` and `= 2` around
 //! what is worth recording, and the signals to trace. All of it stays inside the middle of the travel. Does not run anything: the same programs
 //! are for the machine and for `sollwert run`.
 
+use super::plan_control::control;
 use super::wire::has_linear_motor;
 use crate::base::AxisKind;
 use crate::base::units::{deg_from_rad, mm_min_from_mm_s};
@@ -112,21 +113,23 @@ pub fn plan(machine: &Machine, axes: &[crate::base::AxisId]) -> Vec<PlannedProgr
         Some([find(one)?, find(other)?])
     };
     programs.extend(plane("X", "Y").map(|axes| circle(machine, axes)));
+    let vertical = linear.iter().copied().find(|axis| axis.name == "Z");
+    programs.extend(plane("X", "Y").map(|axes| control(machine, axes, vertical)));
     programs
 }
 
 /// An axis in the units of a program: mm or deg, and per second.
-struct Reach {
-    middle: f64,
-    half: f64,
-    velocity: f64,
+pub(super) struct Reach {
+    pub(super) middle: f64,
+    pub(super) half: f64,
+    pub(super) velocity: f64,
     acceleration: f64,
     jerk: f64,
     assumed: bool,
 }
 
 impl Reach {
-    fn of(axis: &Axis) -> Self {
+    pub(super) fn of(axis: &Axis) -> Self {
         let border = |value: f64| if axis.kind == AxisKind::Rotary { deg_from_rad(value) } else { value };
         let (middle, half, assumed) = match axis.travel_lu {
             Some([low, high]) if !axis.modulo => {
@@ -174,30 +177,30 @@ impl Reach {
 }
 
 /// Lines of a program, and the time that they take.
-struct Lines {
-    text: String,
-    seconds: f64,
+pub(super) struct Lines {
+    pub(super) text: String,
+    pub(super) seconds: f64,
 }
 
 impl Lines {
-    fn line(&mut self, line: &str) {
+    pub(super) fn line(&mut self, line: &str) {
         self.text += line;
         self.text.push('\n');
     }
 
-    fn rest(&mut self, seconds: f64) {
+    pub(super) fn rest(&mut self, seconds: f64) {
         self.line(&format!("G4 F{seconds}"));
         self.seconds += seconds;
     }
 }
 
 /// `X=12.5`: right for any axis name.
-fn word(axis: &Axis, position: f64) -> String {
+pub(super) fn word(axis: &Axis, position: f64) -> String {
     format!("{}={position:.4}", axis.name)
 }
 
 /// F: mm/min, deg/min.
-fn feed_word(speed: f64) -> String {
+pub(super) fn feed_word(speed: f64) -> String {
     format!("F{:.2}", mm_min_from_mm_s(speed))
 }
 
@@ -269,7 +272,7 @@ fn of_axis(machine: &Machine, axis: &Axis) -> PlannedProgram {
     }
 }
 
-fn closing(lines: &mut Lines) {
+pub(super) fn closing(lines: &mut Lines) {
     lines.line("$AN_SLTRACE=2");
     lines.line("M30");
 }

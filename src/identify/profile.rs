@@ -1,14 +1,16 @@
 //! A motion along its path: where, and when, at equal shares of the path.
 //!
 //! In: set-points of a trace, or of a program planned here. Out: [`PathProfile`]: positions, times and mean feeds on [`CELLS`] stretches of
-//! equal length, standstill in front and behind left out. Two motions along nearly the same path are held against each other stretch by
+//! equal length, standstill in front and behind left out; of a program that starts and stops a trace ($AN_SLTRACE), what lies between. Where a trace has
+//! the feed along the path alone, that is all there is. Two motions along nearly the same path are held against each other stretch by
 //! stretch, however different their times are. Does not fit.
 
+use crate::base::units::mm_s_from_mm_min;
 use crate::base::{AxisId, AxisKind};
-use crate::interpreter::Setup;
+use crate::interpreter::{Event, Setup};
 use crate::kernel::{Kernel, Status};
 use crate::machine::Machine;
-use crate::trace::{Clock, Method, Signal, Trace};
+use crate::trace::{Clock, Method, Signal, Trace, TraceEvent};
 use std::sync::Arc;
 
 /// Stretches of a path.
@@ -17,6 +19,26 @@ pub(super) const CELLS: usize = 3000;
 const SETPOINTS_MAX: usize = 20_000_000;
 /// A step below this is standstill.
 const STEP_MIN_MM: f64 = 1e-7;
+
+/// Feed along the path.
+pub(super) const FEED: &str = "path.feed_mm_min";
+
+/// Linear axes of a machine.
+pub(super) fn linear_axes(machine: &Machine) -> Vec<AxisId> {
+    machine.axis_ids().filter(|id| machine.axis(*id).kind == AxisKind::Linear).collect()
+}
+
+/// Between the events of $AN_SLTRACE = 1 and = 2 of a recording.
+fn traced_between_s(trace: &Trace) -> Option<[f64; 2]> {
+    let of = |text: &str| {
+        let fits = |event: &&TraceEvent| {
+            event.event.kind.as_deref() == Some("trace") && event.event.text.as_deref() == Some(text)
+        };
+        trace.events.iter().rev().find(fits).map(|event| event.time_s)
+    };
+    let from_s = of("start")?;
+    Some([from_s, of("stop").filter(|to_s| *to_s > from_s).unwrap_or(f64::INFINITY)])
+}
 
 /// A motion on equal stretches of its path.
 #[derive(Clone, Debug)]
@@ -49,7 +71,10 @@ impl PathProfile {
             axes.iter().map(|id| trace.axis_signal(&machine.axis(*id).name, "position_setpoint")).collect();
         let signals = signals?;
         let grid = &signals.first()?.times;
-        let (start_s, end_s, period_s) = (grid.start_s()?, grid.end_s()?, grid.period_s()?);
+        let (mut start_s, mut end_s, period_s) = (grid.start_s()?, grid.end_s()?, grid.period_s()?);
+        if let Some([from_s, to_s]) = traced_between_s(trace) {
+            (start_s, end_s) = (start_s.max(from_s), end_s.min(to_s));
+        }
         let rows = ((end_s - start_s) / period_s).round();
         if !(1.0..SETPOINTS_MAX as f64).contains(&rows) {
             return None;
@@ -66,14 +91,55 @@ impl PathProfile {
         complete.then(|| Self::of(&places, period_s, 0.0)).flatten()
     }
 
+    /// Of the feed along the path of a trace; `None` without it.
+    pub(super) fn of_feed(trace: &Trace) -> Option<Self> {
+        let signal = trace.signal(FEED)?;
+        let (start_s, end_s, period_s) = (signal.times.start_s()?, signal.times.end_s()?, signal.times.period_s()?);
+        let [start_s, end_s] =
+            traced_between_s(trace).map_or([start_s, end_s], |[from_s, to_s]| [start_s.max(from_s), end_s.min(to_s)]);
+        let rows = ((end_s - start_s) / period_s).round();
+        if !(1.0..SETPOINTS_MAX as f64).contains(&rows) {
+            return None;
+        }
+        let times: Vec<f64> = (0..=rows as usize).map(|k| start_s + k as f64 * period_s).collect();
+        // Where there is no path there is no feed.
+        let feeds = signal.resampled(&times, Method::Linear);
+        let mut way_mm = 0.0;
+        let mut ways = vec![vec![0.0]];
+        for pair in feeds.windows(2) {
+            let [from, to] = [pair[0], pair[1]].map(|feed| if feed.is_finite() { mm_s_from_mm_min(feed) } else { 0.0 });
+            way_mm += (from + to) / 2.0 * period_s;
+            ways.push(vec![way_mm]);
+        }
+        let mut profile = Self::of(&ways, period_s, 0.0)?;
+        profile.places_mm.clear();
+        Some(profile)
+    }
+
     /// Of a program as this machine plans it; `None` after an alarm.
     pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId]) -> Option<Self> {
         let mut kernel = Kernel::new(machine.clone(), setup.clone(), false);
         let period_s = machine.cycle.time_base.seconds(machine.cycle.time_base.ticks_per_setpoint());
         let mut places = Vec::new();
         let (mut feed_sum, mut feed_count) = (0.0, 0.0_f64);
+        // Until the program says otherwise all of it is.
+        let mut traced = true;
         loop {
             let status = kernel.cycle().ok()?;
+            for event in kernel.output().begun.iter().flat_map(|begun| &begun.events) {
+                let Event::Trace(starts) = event else { continue };
+                if *starts {
+                    places.clear();
+                    (feed_sum, feed_count) = (0.0, 0.0);
+                }
+                traced = *starts;
+            }
+            if !traced {
+                if status == Status::Finished {
+                    break;
+                }
+                continue;
+            }
             if let Some(setpoint) = kernel.output().setpoint {
                 places.push(axes.iter().map(|id| setpoint.axes[*id].position_lu).collect());
                 if let (Some(feed), false) = (setpoint.path.programmed_feed_lu_s, setpoint.path.rotary_only) {
@@ -123,6 +189,9 @@ impl PathProfile {
 
     /// Sideways distances from `reference` at equal shares of the path, one vector a border.
     pub(super) fn sideways_mm(&self, reference: &Self) -> Vec<f64> {
+        if self.places_mm.is_empty() || reference.places_mm.is_empty() {
+            return Vec::new();
+        }
         let mut all = Vec::with_capacity(self.places_mm.len() * 3);
         let shift: Vec<f64> = reference.places_mm[0].iter().zip(&self.places_mm[0]).map(|(a, b)| a - b).collect();
         for cell in 0..=CELLS {
@@ -144,8 +213,11 @@ impl PathProfile {
         (square / CELLS as f64).sqrt()
     }
 
-    /// RMS of the sideways distances.
+    /// RMS of the sideways distances; NaN without a path.
     pub(super) fn sideways_rms_mm(&self, reference: &Self) -> f64 {
+        if reference.places_mm.is_empty() {
+            return f64::NAN;
+        }
         let square: f64 = self.sideways_mm(reference).iter().map(|off| off * off).sum();
         (square / (CELLS + 1) as f64).sqrt()
     }

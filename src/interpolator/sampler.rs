@@ -12,7 +12,7 @@
 
 use super::overlay::Overlay;
 use super::spindle_course::SpindleCourse;
-use super::{AxisSetpoint, ExactStopWait, PathSample, Setpoint};
+use super::{AxisSetpoint, ExactStopWait, PathSample, Setpoint, SpindleSetpoint};
 use crate::base::{AxisVector, PerAxis, TimeBase};
 use crate::feed::{Limit, LimitKind, PathState, PlannedPiece, ProgrammedTime};
 use crate::interpreter::{Event, ExactStop};
@@ -241,6 +241,11 @@ impl Interpolator {
     /// Exchanges the list of what began for `other`, so that it outlives the next sample without a copy.
     pub fn swap_begun(&mut self, other: &mut Vec<Begun>) {
         std::mem::swap(&mut self.begun, other);
+    }
+
+    /// The master spindle at a set-point behind the end of the path, where it goes on as it was told.
+    pub fn spindle_behind_end(&self, k: u64) -> SpindleSetpoint {
+        self.active.as_ref().map_or_else(SpindleSetpoint::default, |active| self.spindle.at(k, &active.at_end()))
     }
 
     /// True once the set-point at the end of the path has been given.

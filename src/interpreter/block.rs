@@ -58,6 +58,10 @@ pub(super) struct Collected {
     /// T and M6: output before the motion where the block has an M6.
     pub tool_events: Vec<Event>,
     pub tool_change: bool,
+    /// Events of the simulated spindle while another one is the master spindle, or that no S or M stands for.
+    pub simulated_spindle: Vec<Event>,
+    /// G63.
+    taps_with_chuck: bool,
     /// T changes the tool without M6.
     pub tool_loads: bool,
     /// D.
@@ -126,7 +130,7 @@ impl Interpreter {
     }
 
     fn act(&mut self, block: &mut Collected) -> Outcome<()> {
-        let mut events = std::mem::take(&mut block.events);
+        let mut events = self.take_events(block);
         self.tool_words(block, &mut events)?;
         self.start_positions(block)?;
         if !block.motion.any() && block.corner.has_shape() {
@@ -136,7 +140,7 @@ impl Interpreter {
                 .help("RNDM= rounds all corners from here on"));
         }
         if block.motion.any() {
-            self.motion(&block.motion, &mut events)?;
+            self.move_block(block, &mut events)?;
             if let Some(last) = self.queue.pop_back() {
                 let corner = self.corner_insert(&last.kind, &block.corner, block.motion.suppression);
                 self.queue.push_back(Move { corner, ..last });
@@ -150,6 +154,18 @@ impl Interpreter {
             self.emit_function(vec![Event::SpindleWait], true);
         }
         Ok(())
+    }
+
+    /// G63 is a straight line with F that ends at rest, in its block alone.
+    fn move_block(&mut self, block: &mut Collected, events: &mut Vec<Event>) -> Outcome<()> {
+        if !block.taps_with_chuck {
+            return self.motion(&block.motion, events);
+        }
+        block.motion.exact_stop = true;
+        let modal = std::mem::replace(&mut self.modal.motion, Motion::Line);
+        let moved = self.motion(&block.motion, events);
+        self.modal.motion = modal;
+        moved
     }
 
     fn word(&mut self, word: &Word, block: &mut Collected) -> Outcome<()> {
@@ -264,6 +280,7 @@ impl Interpreter {
             GFunction::Thread(word) => self.modal.motion = Motion::Thread(word),
             GFunction::Dwell => block.dwell = Some(columns.clone()),
             GFunction::ExactStopOnce => block.motion.exact_stop = true,
+            GFunction::TapWithChuck => block.taps_with_chuck = true,
             GFunction::Plane(plane) => self.modal.plane = plane,
             GFunction::SuppressFrames(which) => block.motion.suppress(which),
             GFunction::AxialOffset(coarse) => self.axial_offset(coarse, columns, block)?,
@@ -332,9 +349,10 @@ impl Interpreter {
             Address::Radius => block.motion.radius = Some((typed, columns.clone())),
             Address::Turn => block.motion.turns = turns(typed, columns)?,
             Address::StartAngle => block.motion.start_angle = Some((typed, columns.clone())),
+            Address::ThreadRun { leaves } => self.thread_run(leaves, typed, columns)?,
             Address::Feed => block.feed = Some((typed, columns.clone())),
             Address::SpindleSpeed => {
-                let speed_rpm = spindle_speed_rpm(typed, columns)?;
+                let speed_rpm = spindle_speed(typed, columns)?;
                 block.spindle_speed_rpm = Some((speed_rpm, columns.clone()));
                 block.events.push(Event::SpindleSpeed { speed_rpm });
             }
@@ -380,7 +398,7 @@ impl Interpreter {
         Ok(())
     }
 
-    fn m_word(&mut self, number: u32, block: &mut Collected) {
+    pub(super) fn m_word(&mut self, number: u32, block: &mut Collected) {
         self.note_spindle(number);
         m_function(number, block);
         if number == SPINDLE_POSITION {
@@ -415,7 +433,7 @@ impl Interpreter {
             return Err(Fault::new(codes::DWELL, columns.clone(), format!("a wait of {time_s} s is not possible"))
                 .label(format!("expected 0 to {DWELL_MAX_S} s")));
         }
-        let mut events = std::mem::take(&mut block.events);
+        let mut events = self.take_events(block);
         self.change_and_apply(block)?;
         if block.tool_change {
             events.splice(0..0, block.tool_events.drain(..));
@@ -475,14 +493,17 @@ fn m_function(number: u32, block: &mut Collected) {
     block.events.push(event);
 }
 
-fn spindle_speed_rpm(typed: Typed, columns: &Columns) -> Outcome<f64> {
-    if typed.0 >= 0.0 {
+fn spindle_speed(typed: Typed, columns: &Columns) -> Outcome<f64> {
+    if (0.0..=SPINDLE_SPEED_MAX).contains(&typed.0) {
         return Ok(typed.0);
     }
-    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("spindle speed {} rpm is below 0", typed.0))
-        .label("expected 0 or more")
+    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("spindle speed {} rpm is not possible", typed.0))
+        .label(format!("expected 0 to {SPINDLE_SPEED_MAX}"))
         .help("M3 and M4 give the direction"))
 }
+
+/// Highest S: of a spindle in rpm, of a cutting speed in m/min, of a dwell in revolutions.
+const SPINDLE_SPEED_MAX: f64 = 1e6;
 
 /// TURN counts to 999 on the control.
 fn turns(typed: Typed, columns: &Columns) -> Outcome<u32> {

@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 /// rotation it would grow beyond all numbers.
 const SPINDLE_SPEED_MAX_RPM: f64 = 100_000.0;
 
+/// The spindle that the machine file describes.
+pub const SIMULATED_SPINDLE: u32 = 1;
+
 /// Unit of F.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum FeedBase {
@@ -49,6 +52,12 @@ pub struct FeedModes {
     pub spindle_limits_rpm: [Option<f64>; 2],
     /// M3 or M4 was output last, and no M5.
     pub spindle_turns: bool,
+    /// OVRA of the simulated spindle, and the switch of the control panel.
+    pub spindle_override_ratio: [f64; 2],
+    /// Highest speed of the simulated spindle (MD35100), and its share by VELOLIM.
+    pub spindle_max_rpm: Option<f64>,
+    /// VELOLIM of the simulated spindle.
+    pub spindle_max_ratio: f64,
     /// SETMS.
     pub master_spindle: u32,
     /// The spindles that are not the master spindle: speed, and whether they turn.
@@ -80,7 +89,10 @@ impl Default for FeedModes {
             cutting_limit_rpm: None,
             spindle_limits_rpm: [None; 2],
             spindle_turns: false,
-            master_spindle: 1,
+            spindle_override_ratio: [1.0; 2],
+            spindle_max_rpm: None,
+            spindle_max_ratio: 1.0,
+            master_spindle: SIMULATED_SPINDLE,
             other_spindles: BTreeMap::new(),
             rapid_by_axis: false,
             positioning_feed_lu_s: PerAxis::splat(None),
@@ -124,17 +136,49 @@ impl FeedModes {
         self.note_plain();
     }
 
-    /// A speed within G25 S and G26 S.
+    /// The speed that the master spindle gets for an S: with the overrides, within G25 S, G26 S and the limit of the machine.
     pub fn limited_rpm(&self, speed_rpm: f64) -> f64 {
+        self.within_limits_rpm(speed_rpm * self.override_ratio())
+    }
+
+    /// The same where the overrides do not act: tapping.
+    pub fn within_limits_rpm(&self, speed_rpm: f64) -> f64 {
         let [low_rpm, high_rpm] = self.spindle_limits_rpm;
         let raised_rpm = if speed_rpm > 0.0 { speed_rpm.max(low_rpm.unwrap_or(0.0)) } else { speed_rpm };
-        raised_rpm.min(high_rpm.unwrap_or(f64::INFINITY))
+        raised_rpm.min(high_rpm.unwrap_or(f64::INFINITY)).min(self.highest_rpm().unwrap_or(f64::INFINITY))
+    }
+
+    /// The master spindle is the one that the machine file describes.
+    pub fn master_is_simulated(&self) -> bool {
+        self.master_spindle == SIMULATED_SPINDLE
+    }
+
+    /// Of the master spindle.
+    pub fn override_ratio(&self) -> f64 {
+        if self.master_is_simulated() { self.spindle_override_ratio.iter().product() } else { 1.0 }
+    }
+
+    /// What the machine and VELOLIM allow the master spindle.
+    pub fn highest_rpm(&self) -> Option<f64> {
+        Some(self.spindle_max_rpm? * self.spindle_max_ratio).filter(|_| self.master_is_simulated())
+    }
+
+    /// Behind SAVE: what is no G function stays as the sub-program left it.
+    pub fn keep_spindles(&mut self, left: Self) {
+        self.spindle_turns = left.spindle_turns;
+        self.spindle_override_ratio = left.spindle_override_ratio;
+        self.spindle_max_ratio = left.spindle_max_ratio;
+        self.master_spindle = left.master_spindle;
+        self.other_spindles = left.other_spindles;
+        self.spindle_limits_rpm = left.spindle_limits_rpm;
+        self.cutting_limit_rpm = left.cutting_limit_rpm;
     }
 
     /// Lowest and highest speed under a constant cutting speed.
     pub fn cutting_limits_rpm(&self) -> [f64; 2] {
         let [low_rpm, high_rpm] = self.spindle_limits_rpm;
         let limit_rpm = self.cutting_limit_rpm.unwrap_or(SPINDLE_SPEED_MAX_RPM).min(SPINDLE_SPEED_MAX_RPM);
+        let limit_rpm = limit_rpm.min(self.highest_rpm().unwrap_or(f64::INFINITY));
         [low_rpm.unwrap_or(0.0), high_rpm.unwrap_or(f64::INFINITY).min(limit_rpm)]
     }
 
@@ -142,6 +186,6 @@ impl FeedModes {
     pub fn cutting_rpm(&self, cutting_speed_mm_s: f64, radius_mm: f64) -> f64 {
         let speed_rpm = cutting_speed_mm_s / (RAD_PER_REV * radius_mm.abs()) * S_PER_MIN;
         let limit_rpm = self.cutting_limit_rpm.unwrap_or(SPINDLE_SPEED_MAX_RPM);
-        self.limited_rpm(speed_rpm.min(limit_rpm).min(SPINDLE_SPEED_MAX_RPM))
+        self.limited_rpm(speed_rpm.min(SPINDLE_SPEED_MAX_RPM)).min(limit_rpm)
     }
 }

@@ -6,10 +6,9 @@
 //! * G97, G971, G972, G973, G942 and G952 keep the spindle speed that G96 came to last.
 //! * CFC, CFTCP and CFIN are kept, and have no effect without tool radius compensation (G41, G42), which is not built.
 //! * OVR acts on F, OVRRAP on rapids, each from more than 0 to 200 %; a rapid is never faster than its axes. 0 would hold the axes for ever.
-//! * ACC of 1 to 200 %, VELOLIM of 1 to 100 %, JERKLIM of 1 to 200 %. For a spindle (S1, SPI(1)) they are put on record.
-//! * Speeds and positions of other spindles than the master spindle are put on record, and take no time.
+//! * ACC of 1 to 200 %, VELOLIM of 1 to 100 %, JERKLIM of 1 to 200 %.
 //!
-//! Positioning axes are in `positioning`, the feed of a motion in `path_feed`.
+//! Spindles are in `spindle_words`, positioning axes are in `positioning`, the feed of a motion in `path_feed`.
 
 use super::block::{Collected, FEED_MIN, not_built, whole};
 use super::evaluate::number;
@@ -18,7 +17,6 @@ use super::path_feed::inverse_time_s;
 use super::run::Interpreter;
 use super::value::trimmed;
 use super::wire::{Event, ProgrammedLimits};
-use crate::base::units::mm_s_from_m_min;
 use crate::base::{AxisId, AxisKind, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode};
 use crate::program::syntax::{Address, Expr, ExprKind, IndexedValue, Typed};
@@ -41,7 +39,7 @@ impl Interpreter {
             self.modal.feed = None;
         }
         if was_cutting && !modes.cutting {
-            self.modal.spindle_speed_rpm = speed_rpm.unwrap_or(0.0);
+            self.keep_speed(speed_rpm.unwrap_or(0.0));
         }
         Ok(())
     }
@@ -97,26 +95,10 @@ impl Interpreter {
                 block.motion.block_feed = Some(self.modal.programmed_feed(typed));
             }
         }
-        if let Some((speed, _)) = block.spindle_speed_rpm {
-            self.take_spindle_speed(speed, block);
+        if let Some((speed, columns)) = block.spindle_speed_rpm.clone() {
+            self.take_spindle_speed(speed, &columns, block);
         }
         Ok(())
-    }
-
-    /// S: the speed, or under G96 the cutting speed.
-    fn take_spindle_speed(&mut self, speed: f64, block: &mut Collected) {
-        if !self.modal.feed_modes.cutting {
-            self.modal.spindle_speed_rpm = speed;
-            let limited_rpm = self.modal.feed_modes.limited_rpm(speed);
-            if limited_rpm != speed {
-                output_speed(block, limited_rpm);
-            }
-            return;
-        }
-        self.modal.feed_modes.cutting_speed_mm_s = Some(mm_s_from_m_min(speed));
-        let speed_rpm = self.cutting_rpm_here().unwrap_or(0.0);
-        self.modal.spindle_speed_rpm = speed_rpm;
-        output_speed(block, speed_rpm);
     }
 
     /// M3, M4, M5 and the like.
@@ -150,19 +132,11 @@ impl Interpreter {
             Address::H => block.events.push(Event::HFunction(typed.0)),
             Address::SpindleSpeedOf(spindle) => {
                 let speed_rpm = within(typed.0, [0.0, 1e6], "rpm", columns)?;
-                let named = Event::Spindle(format!("S{spindle}={}", trimmed(speed_rpm)).into());
-                let master = spindle == self.modal.feed_modes.master_spindle;
-                block.events.push(if master { Event::SpindleSpeed { speed_rpm } } else { named });
-                self.other_spindle(spindle, |state| state.0 = speed_rpm);
+                self.speed_of(spindle, speed_rpm, columns, block);
             }
             Address::MOf(spindle) => {
                 let function = whole(typed, columns, "M")?;
-                let named = Event::Spindle(format!("M{spindle}={function}").into());
-                let master = spindle == self.modal.feed_modes.master_spindle && turns_after(function).is_some();
-                block.events.push(if master { Event::MFunction(function) } else { named });
-                if let Some(turns) = turns_after(function) {
-                    self.other_spindle(spindle, |state| state.1 = turns);
-                }
+                self.function_of(spindle, function, columns, block);
             }
             _ => return Err(not_built("this address", columns)),
         }
@@ -202,10 +176,8 @@ impl Interpreter {
                 .label("expected an axis in [ ]"));
         };
         let typed = Typed(number(&value.value, self)?);
-        if let Some(spindle) = spindle_name(index) {
-            let word = word_of(address);
-            block.events.push(Event::Spindle(format!("{word}[{spindle}]={}", trimmed(typed.0)).into()));
-            return Ok(());
+        if let Some((spindle, name)) = spindle_name(index) {
+            return self.spindle_word(address, (spindle, &name), typed.0, columns, block);
         }
         let axis = self.axis_of(index)?;
         match address {
@@ -290,7 +262,7 @@ impl Interpreter {
                     Some(expr) => whole(Typed(number(expr, self)?), &expr.columns, "SETMS")?,
                     None => 1,
                 };
-                self.set_master(spindle);
+                self.set_master(spindle, columns);
                 block.events.push(Event::Spindle(format!("SETMS({spindle})").into()));
             }
             _ => return Err(not_built("POSP", columns)),
@@ -306,18 +278,6 @@ impl Interpreter {
         let name = if procedure == Procedure::WaitSpindle { "WAITS" } else { "SPCON" };
         block.events.push(Event::Spindle(format!("{name}({})", numbers.join(",")).into()));
         Ok(())
-    }
-
-    /// Speed and sense of the old master spindle are kept for its number.
-    fn set_master(&mut self, spindle: u32) {
-        let modal = &mut self.modal;
-        let modes = &mut modal.feed_modes;
-        if spindle == modes.master_spindle {
-            return;
-        }
-        modes.other_spindles.insert(modes.master_spindle, (modal.spindle_speed_rpm, modes.spindle_turns));
-        let (speed_rpm, turns) = modes.other_spindles.remove(&spindle).unwrap_or((0.0, false));
-        (modal.spindle_speed_rpm, modes.spindle_turns, modes.master_spindle) = (speed_rpm, turns, spindle);
     }
 
     /// The axes that a list names.
@@ -337,26 +297,17 @@ impl Interpreter {
     }
 }
 
-/// The speed that the spindle is given in place of the programmed one.
-fn output_speed(block: &mut Collected, speed_rpm: f64) {
-    for event in &mut block.events {
-        if matches!(event, Event::SpindleSpeed { .. }) {
-            *event = Event::SpindleSpeed { speed_rpm };
-        }
-    }
-}
-
 /// Whether a spindle turns after this M function; `None`: as before.
-fn turns_after(m_function: u32) -> Option<bool> {
+pub(super) fn turns_after(m_function: u32) -> Option<bool> {
     let turns = SPINDLE_TURNS.contains(&m_function);
     (turns || SPINDLE_STANDS.contains(&m_function)).then_some(turns)
 }
 
 /// S1, S2: a spindle where an axis may stand.
-fn spindle_name(index: &Expr) -> Option<String> {
+fn spindle_name(index: &Expr) -> Option<(u32, String)> {
     let ExprKind::Variable { name, indices } = &index.kind else { return None };
     let digits = name.strip_prefix('S').filter(|digits| !digits.is_empty() && indices.is_empty())?;
-    digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| name.to_string())
+    Some((digits.parse().ok()?, name.to_string()))
 }
 
 pub(super) fn word_of(address: IndexedAddress) -> &'static str {
@@ -382,7 +333,7 @@ fn positive_feed(typed: Typed, columns: &Columns) -> Outcome<()> {
 }
 
 /// A percentage above 0, as a share.
-fn percent(value_percent: f64, most_percent: f64, columns: &Columns) -> Outcome<f64> {
+pub(super) fn percent(value_percent: f64, most_percent: f64, columns: &Columns) -> Outcome<f64> {
     if value_percent > 0.0 && value_percent <= most_percent {
         return Ok(value_percent / 100.0);
     }

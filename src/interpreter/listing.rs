@@ -318,6 +318,7 @@ fn event_text(event: &Event) -> String {
         Event::SpindlePosition(positioning) if positioning.text.is_empty() => "spindle=0".to_owned(),
         Event::SpindlePosition(positioning) => positioning.text.to_string(),
         Event::SpindleWait => "spindle=wait".to_owned(),
+        Event::SpindleAcceleration { ratio } => format!("acceleration={ratio}"),
         Event::Programmed(block) => format!("programmed={}", block.motion.word()),
     }
 }

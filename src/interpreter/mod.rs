@@ -47,6 +47,7 @@ mod positioning;
 mod run;
 mod setup;
 mod spindle_position;
+mod spindle_words;
 pub mod spline;
 mod spline_blocks;
 mod strings;

@@ -79,6 +79,8 @@ pub struct Modal {
     pub thread: Option<Arc<Thread>>,
     /// F of G34 and G35, mm a revolution in a revolution; 0 before the first.
     pub lead_change_mm: f64,
+    /// DITS and DITE, along the axis of the lead; `None`: as the axes can.
+    pub thread_runs_mm: [Option<f64>; 2],
     /// F; `None` before the first.
     pub feed: Option<ProgrammedFeed>,
     /// What else the feed, spindle and positioning words have said.
@@ -111,6 +113,7 @@ impl Modal {
             feedforward_active: true,
             thread: None,
             lead_change_mm: 0.0,
+            thread_runs_mm: [None; 2],
             feed: None,
             feed_modes: FeedModes::default(),
             spindle_speed_rpm: 0.0,
@@ -121,6 +124,7 @@ impl Modal {
     /// SAVE: G functions and frames of `saved` hold again; feed, spindle, tool and the other addresses stay.
     pub fn restore(&mut self, saved: Self) {
         let now = std::mem::replace(self, saved);
+        self.feed_modes.keep_spindles(now.feed_modes);
         self.feed = now.feed;
         self.spindle_speed_rpm = now.spindle_speed_rpm;
         self.tool = now.tool;
@@ -147,6 +151,7 @@ impl Modal {
             feedforward_active: self.feedforward_active,
             thread: self.thread.clone(),
             cutting: None,
+            revolution_rad_s: None,
         }
     }
 

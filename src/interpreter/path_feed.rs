@@ -78,7 +78,7 @@ impl Interpreter {
         if self.modal.feed_modes.cutting
             && let Some(speed_rpm) = self.speed_rpm_at(way, 1.0)
         {
-            self.modal.spindle_speed_rpm = speed_rpm;
+            self.keep_speed(speed_rpm);
         }
         Ok(found)
     }
@@ -175,8 +175,20 @@ impl Interpreter {
     pub(super) fn cutting_speed(&self) -> Option<Arc<CuttingSpeed>> {
         let modes = &self.modal.feed_modes;
         let (speed_mm_s, axis) = (modes.cutting_speed_mm_s.filter(|_| modes.cutting)?, self.geometry[0]?);
+        if !modes.master_is_simulated() {
+            return None;
+        }
+        let speed_mm_s = speed_mm_s * modes.override_ratio();
         let limits_rad_s = modes.cutting_limits_rpm().map(rad_s_from_rpm);
         Some(CuttingSpeed { speed_mm_s, axis, limits_rad_s }.into())
+    }
+
+    /// G95 as later rooms need it: the speed that F counts with.
+    pub(super) fn revolution_speed(&self) -> Option<f64> {
+        let modes = &self.modal.feed_modes;
+        let counts = modes.base == FeedBase::Revolution && modes.master_is_simulated() && self.modal.thread.is_none();
+        let speed_rpm = modes.limited_rpm(self.modal.spindle_speed_rpm);
+        (counts && speed_rpm > 0.0).then(|| rad_s_from_rpm(speed_rpm))
     }
 
     /// Speed of the spindle where the axes stand, under G96.

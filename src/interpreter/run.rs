@@ -152,7 +152,9 @@ impl Interpreter {
         }
         let geometry = geometry_axes(machine);
         let zero_offsets = setup.zero_offsets.clone();
-        let modal = Modal::new(&machine.feed, initial_frames(&zero_offsets, geometry));
+        let mut modal = Modal::new(&machine.feed, initial_frames(&zero_offsets, geometry));
+        modal.feed_modes.spindle_max_rpm = machine.spindle_speed_max_rpm;
+        modal.feed_modes.spindle_override_ratio[1] = setup.spindle_override_ratio;
         let known_place = KnownPlace::new(modal.frames.clone(), position);
         let opened = source.opened(ProgramId(0));
         Self {
@@ -384,6 +386,8 @@ impl Interpreter {
         let mut modes = self.modal.modes(exact_stop);
         if self.modal.feed_modes.cutting {
             modes.cutting = self.cutting_speed();
+        } else if matches!(feed, Feed::Path { .. }) {
+            modes.revolution_rad_s = self.revolution_speed();
         }
         let corner = match self.modal.corner.radius_mm {
             Some(_) => self.corner_insert(&kind, &CornerWords::default(), None),

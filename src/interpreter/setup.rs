@@ -28,6 +28,8 @@ pub struct Setup {
     pub zero_offsets: Arc<ZeroOffsets>,
     /// Skip levels that are active, one bit each: bit 0 is `/` and `/0`.
     pub skip_levels: u16,
+    /// The switch of the spindle override at the control panel; 1: S as programmed.
+    pub spindle_override_ratio: f64,
     /// Nothing will move: what only the motion lacks (F) is a finding that does not end the program, so that a listing or a check goes on
     /// to its end.
     pub lists_only: bool,
@@ -41,6 +43,7 @@ impl From<ProgramSource> for Setup {
             shipped: &[],
             definitions: Vec::new(),
             skip_levels: 0,
+            spindle_override_ratio: 1.0,
             lists_only: false,
             zero_offsets: Arc::default(),
             tools: None,

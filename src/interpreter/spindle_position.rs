@@ -6,10 +6,11 @@
 //! * IC counts from where the spindle stands, or comes to rest.
 //! * SPOS and M19 end their block when the spindle has arrived; SPOSA does not, WAITS waits for it. M19 goes to 0 (SD43240).
 //!
-//! Only the master spindle is simulated: others are on record. Does not know the law of the motion.
+//! Only spindle 1 is simulated: others are on record. Does not know the law of the motion.
 
 use super::block::Collected;
 use super::evaluate::number;
+use super::feed_state::SIMULATED_SPINDLE;
 use super::feed_words::word_of;
 use super::run::Interpreter;
 use super::value::trimmed;
@@ -52,17 +53,14 @@ impl Interpreter {
             Form::Incremental => (SpindleApproach::By, format!("IC({})", trimmed(angle_deg))),
         };
         let text = format!("{word}{name}={shown}").into();
-        let master = self.modal.feed_modes.master_spindle;
         let spindle = match index {
             Some(index) => number(index, self)?.max(0.0) as u32,
-            None => master,
+            None => self.modal.feed_modes.master_spindle,
         };
         self.other_spindle(spindle, |state| state.1 = false);
-        if spindle != master {
-            self.report_no_time(
-                columns,
-                "SPOS of this spindle is recorded and takes no time: only the master spindle moves",
-            );
+        if spindle != SIMULATED_SPINDLE {
+            self.report_unsimulated(spindle, columns);
+            self.report_no_time(columns, "SPOS of this spindle is recorded and takes no time: only spindle 1 moves");
             block.events.push(Event::Spindle(text));
             return Ok(());
         }
@@ -78,8 +76,10 @@ impl Interpreter {
 
     /// M19.
     pub(super) fn home_spindle(&mut self, block: &mut Collected) {
-        let positioning = SpindlePositioning { angle_rad: 0.0, approach: SpindleApproach::Onward, text: "".into() };
-        block.events.push(Event::SpindlePosition(positioning.into()));
+        if !self.modal.feed_modes.master_is_simulated() {
+            return;
+        }
+        block.events.push(home());
         block.waits_for_spindle |= self.machine.spindle.is_some();
     }
 
@@ -91,4 +91,10 @@ impl Interpreter {
             self.warn(*fault);
         }
     }
+}
+
+/// To 0, as M19.
+pub(super) fn home() -> Event {
+    let positioning = SpindlePositioning { angle_rad: 0.0, approach: SpindleApproach::Onward, text: "".into() };
+    Event::SpindlePosition(positioning.into())
 }

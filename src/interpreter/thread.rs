@@ -10,6 +10,9 @@
 //! * G331: the sign of the lead is the sense of the spindle, as M3 or as M4; G332 turns it back. The spindle must stand, S is its speed.
 //! * The cutting speed must not be constant (G96): the spindle would change its speed in the thread.
 //!
+//! * DITS and DITE hold until they are written again (SD42010); a negative one is as without: what the limits of the axes need.
+//! * Overrides of the spindle act on threads that are cut, and not on tapping.
+//!
 //! Does not know accelerations, nor when the spindle passes an angle.
 
 use super::block::Collected;
@@ -19,6 +22,7 @@ use super::value::trimmed;
 use super::wire::{Feed, MoveKind, Thread, ThreadCoupling};
 use crate::base::units::{RAD_PER_REV, rad_from_deg, rad_s_from_rpm};
 use crate::base::{AxisKind, PartPoint};
+use crate::program::syntax::Typed;
 use crate::program::words::ThreadWord;
 use crate::program::{Columns, Fault, Outcome, codes};
 use std::sync::Arc;
@@ -53,6 +57,18 @@ impl Interpreter {
         Ok(())
     }
 
+    /// DITS and DITE; a negative value is that of the axes again.
+    pub(super) fn thread_run(&mut self, leaves: bool, typed: Typed, columns: &Columns) -> Outcome<()> {
+        let run_mm = self.modal.length_mm(typed);
+        if run_mm.is_nan() || run_mm > LEAD_MAX_MM {
+            let message = "DITS and DITE are ways of the axis of the thread";
+            return Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), message)
+                .label(format!("expected at most {LEAD_MAX_MM} mm, or -1")));
+        }
+        self.modal.thread_runs_mm[usize::from(leaves)] = (run_mm >= 0.0).then_some(run_mm);
+        Ok(())
+    }
+
     /// The block as a thread; leaves its coupling in the modal state for the move.
     pub(super) fn thread(&mut self, word: ThreadWord, words: &MotionWords, end: PartPoint) -> Outcome<MoveKind> {
         let columns = words.columns();
@@ -83,8 +99,16 @@ impl Interpreter {
                 start_angle_rad: words.start_angle.as_ref().map(|(typed, _)| rad_from_deg(typed.0)),
             },
         };
-        let thread =
-            Thread { coupling, rise_mm: lead_mm.abs() * ratio, rise_change_mm: change_mm * ratio, speed_rad_s };
+        let runs_mm = self.modal.thread_runs_mm.map(|run_mm| run_mm.map(|run_mm| run_mm * ratio));
+        let simulated = self.modal.feed_modes.master_is_simulated();
+        let thread = Thread {
+            coupling,
+            rise_mm: lead_mm.abs() * ratio,
+            rise_change_mm: change_mm * ratio,
+            speed_rad_s,
+            runs_mm,
+            simulated,
+        };
         let last_mm = thread.rise_at_mm(length_mm) / ratio;
         if last_mm.is_nan() || last_mm < LEAD_MIN_MM {
             let most_mm = lead_mm * lead_mm / (2.0 * axis_way_mm.abs());
@@ -149,7 +173,10 @@ impl Interpreter {
         if !taps && !modes.spindle_turns {
             return fault("a thread, and the spindle stands", "write M3 or M4 before it; the control would wait here");
         }
-        let speed_rpm = modes.limited_rpm(self.modal.spindle_speed_rpm);
+        let speed_rpm = match taps {
+            true => modes.within_limits_rpm(self.modal.spindle_speed_rpm),
+            false => modes.limited_rpm(self.modal.spindle_speed_rpm),
+        };
         if speed_rpm <= 0.0 {
             return fault("a thread, and no spindle speed is programmed", "write S before it");
         }

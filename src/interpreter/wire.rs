@@ -209,6 +209,8 @@ pub struct Modes {
     pub thread: Option<Arc<Thread>>,
     /// G96 and its kin: the master spindle follows the distance from its axis.
     pub cutting: Option<Arc<CuttingSpeed>>,
+    /// G95 and its kin: F counts revolutions of the simulated spindle at this speed, rad/s, and follows it while it changes.
+    pub revolution_rad_s: Option<f64>,
 }
 
 /// A constant cutting speed: the speed of the spindle is `speed / radius`, within limits.
@@ -241,6 +243,10 @@ pub struct Thread {
     pub rise_change_mm: f64,
     /// Programmed speed of the spindle, positive.
     pub speed_rad_s: f64,
+    /// DITS and DITE: path in which the axis comes to the speed of the thread, and leaves it; `None`: as its limits allow.
+    pub runs_mm: [Option<f64>; 2],
+    /// The spindle is the one of the machine file; if not (SETMS), nothing waits for its angle, and it does not turn with the path.
+    pub simulated: bool,
 }
 
 /// Which of axis and spindle leads.
@@ -345,6 +351,7 @@ impl Modes {
             feedforward_active: true,
             thread: None,
             cutting: None,
+            revolution_rad_s: None,
         }
     }
 }
@@ -481,6 +488,11 @@ pub enum Event {
     SpindlePosition(Arc<SpindlePositioning>),
     /// The path rests until the master spindle is at its speed or position.
     SpindleWait,
+    /// ACC of the spindle, for the ramps that begin from here on.
+    SpindleAcceleration {
+        /// 1: that of the machine.
+        ratio: f64,
+    },
     /// What the program asks of the path from here on (smoothing makes it of a motion block, for recordings).
     Programmed(Arc<ProgrammedBlock>),
 }

@@ -210,7 +210,7 @@ impl<S: PieceSource> Kernel<S> {
 
     /// With rows of every axis at the rate of its speed or current loop. Figures count position ticks in any case.
     pub fn with_rows_at(mut self, rate: RecordRate) -> Self {
-        let drives = self.machine.axes.iter().zip(self.drives.drives());
+        let drives = self.machine.axes.iter().zip(self.drives.drives_mut());
         for (cycle, (axis, drive)) in self.position_cycles.iter_mut().zip(drives) {
             let driven = matches!(drive, Drive::Cascade(_));
             cycle.rows = InnerRows::new(axis.drive.as_ref().filter(|_| driven), rate);
@@ -279,7 +279,8 @@ impl<S: PieceSource> Kernel<S> {
             }
         }
         let stands = |axis| AxisSetpoint { position_lu: last.axes[axis].position_lu, ..AxisSetpoint::default() };
-        let mut standing = Setpoint { tick, axes: PerAxis::from_fn(stands), ..last };
+        let spindle = self.interpolator.spindle_behind_end(self.next_setpoint);
+        let mut standing = Setpoint { tick, axes: PerAxis::from_fn(stands), spindle, ..last };
         standing.path.limit = Limit { kind: LimitKind::InPosition, axis: None };
         standing.path.programmed_feed_lu_s = None;
         self.ahead.setpoint = Some(standing);
@@ -307,7 +308,7 @@ impl<S: PieceSource> Kernel<S> {
                     continue;
                 }
                 let (setpoint_sent, signals) = (self.step.sent[axis], self.step.signals[axis]);
-                if !self.drives.drives()[axis.index()].is_finite() {
+                if !self.drives.is_finite(axis.index()) {
                     return Err(diverged(&self.machine, axis, tick));
                 }
                 self.figures.drive(axis, &signals);
@@ -367,7 +368,7 @@ impl<S: PieceSource> Kernel<S> {
         self.output.tool_setpoint = self.kinematics.tip_pose(&sent, &setpoint.tool_length);
         self.output.tool_actual = self.kinematics.tip_pose(&actual, &setpoint.tool_length);
         self.contour_error.push(self.output.tool_setpoint.position_mm);
-        if self.drives.drives().iter().any(|drive| matches!(drive, Drive::Cascade(_))) {
+        if self.drives.has_cascade() {
             self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
         }
     }

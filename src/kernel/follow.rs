@@ -8,6 +8,7 @@ use super::cycle::AxisRow;
 use super::figures::Figures;
 use super::inner_rows::InnerRows;
 use super::record::{FollowRow, record_alarm, record_follow};
+use super::setpoint_limits::SetpointLimits;
 use super::setpoint_table::{SetpointTable, row_ticks};
 use super::summary::{RunSummary, Warning, drive_warnings};
 use crate::base::{Diagnostic, MachinePoint, PerAxis, Severity, Tick};
@@ -78,6 +79,7 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
         warnings.push(Diagnostic::warning("F0012", message));
     }
     warnings.extend(drive_warnings(machine, true));
+    warnings.extend(follower.limits.warnings(machine));
     let stopped = machine.axis_ids().filter_map(|axis| follower.stopped[axis].take());
     warnings.extend(stopped.map(|alarm| Diagnostic { severity: Severity::Warning, ..alarm }));
     let summary = summary(machine, &follower.figures, rows, &warnings, alarm.as_ref());
@@ -126,6 +128,8 @@ struct Follower<'a> {
     inner: Vec<InnerRows>,
     /// An axis gives more than one row a position cycle.
     sorts_rows: bool,
+    /// What the set-points have exceeded.
+    limits: SetpointLimits,
     /// For what a control would have stopped an axis first.
     stopped: PerAxis<Option<Diagnostic>>,
     next_row: usize,
@@ -151,6 +155,7 @@ impl<'a> Follower<'a> {
             rows: Vec::with_capacity(machine.axes.len()),
             inner: machine.axes.iter().map(|axis| InnerRows::new(axis.drive.as_ref(), rate)).collect(),
             sorts_rows: rate != RecordRate::Position,
+            limits: SetpointLimits::new(),
             stopped: PerAxis::from_fn(|_| None),
             next_row: 0,
         }
@@ -185,6 +190,7 @@ impl<'a> Follower<'a> {
             if !drive.is_finite() {
                 return Err(diverged(machine, axis, tick));
             }
+            self.limits.see(machine, axis, &setpoint, machine.cycle.time_base.time_s(tick));
             self.setpoints[axis] = setpoint;
             self.actual[axis] = signals.position_actual_lu;
             self.figures.drive(axis, &signals);

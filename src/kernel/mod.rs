@@ -16,6 +16,7 @@ mod inner_rows;
 mod preparation;
 mod record;
 mod run;
+mod setpoint_limits;
 mod setpoint_table;
 mod summary;
 mod threads;

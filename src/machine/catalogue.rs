@@ -252,6 +252,16 @@ const SPINDLE: &[Key] = &[
     )
     .md("MD35200"),
     Key::new(
+        "speed_max_rpm",
+        "rpm",
+        Number(Range::Between(0.1, 1e6)),
+        Means("no limit"),
+        "highest speed of the master spindle: a higher S turns it at this one",
+    )
+    .md("MD35100, MD35130"),
+    Key::new("feed_starts_at_once", "", Flag, No, "a feed does not wait for the speed of the spindle (MD35500 = 0)")
+        .md("MD35500"),
+    Key::new(
         "speed_tolerance",
         "",
         Number(Range::Between(0.0, 1.0)),

@@ -24,6 +24,8 @@ pub struct Machine {
     pub smoothing: SmoothingSettings,
     /// `[spindle]`; `None`: the master spindle is at its speed at once.
     pub spindle: Option<SpindleSettings>,
+    /// Highest speed of the master spindle; `None`: no limit.
+    pub spindle_speed_max_rpm: Option<f64>,
     /// `[kinematics]`.
     pub kinematics: KinematicsSettings,
     /// Axes in order of their `index`; [`AxisId`] is the place in this list.
@@ -35,8 +37,10 @@ pub struct Machine {
 pub struct SpindleSettings {
     /// In speed control.
     pub acceleration_rad_s2: f64,
-    /// A feed waits until the speed is this near; 0: it does not wait.
+    /// A feed waits until the speed is this near, as a share of it.
     pub tolerance_share: f64,
+    /// A feed does not wait for the speed.
+    pub starts_at_once: bool,
     /// A feed behind M5 waits as well.
     pub waits_for_stop: bool,
     /// Speed of positioning, and at which a spindle that turns goes over to it.

@@ -58,13 +58,14 @@ pub(super) fn spindle(root: &Section<'_>) -> Option<SpindleSettings> {
     let tolerance_share = spindle.number("speed_tolerance");
     let acceleration_rot_s2 = spindle.optional_number("acceleration_rot_s2");
     let positioning_rot_s2 = spindle.optional_number("positioning_acceleration_rot_s2");
-    let waits_for_stop = spindle.flag("feed_waits_for_stop");
+    let [waits_for_stop, starts_at_once] = ["feed_waits_for_stop", "feed_starts_at_once"].map(|key| spindle.flag(key));
     let [positioning_speed_rpm, lag_ms] = ["positioning_speed_rpm", "lag_ms"].map(|key| spindle.number(key));
     let acceleration_rot_s2 = acceleration_rot_s2?;
     let positioning_rot_s2 = positioning_rot_s2.unwrap_or(acceleration_rot_s2);
     Some(SpindleSettings {
         acceleration_rad_s2: rad_from_rot(acceleration_rot_s2),
         tolerance_share,
+        starts_at_once,
         waits_for_stop,
         positioning_speed_rad_s: rad_s_from_rpm(positioning_speed_rpm),
         positioning_acceleration_rad_s2: rad_from_rot(positioning_rot_s2),

@@ -163,6 +163,7 @@ fn machine(root: &Section<'_>) -> Machine {
         feed: control::feed(root),
         smoothing: control::smoothing(root),
         spindle: control::spindle(root),
+        spindle_speed_max_rpm: root.table("spindle", "spindle").optional_number("speed_max_rpm"),
         kinematics: control::kinematics(root, &axes),
         axes,
     }

@@ -126,4 +126,6 @@ codes! {
     LATE_DEFINITION "W0006" "A DEF behind the first executable block";
     RAISED_AND_SHOWN "W0007" "An alarm of the program that does not stop it (SETAL)";
     SPINDLE_TIME "W0008" "A spindle position that takes no time";
+    SPINDLE_UNKNOWN "W0009" "A spindle that is not simulated";
+    SPINDLE_LIMITED "W0010" "A spindle speed above the highest one";
 }

@@ -24,6 +24,8 @@ pub enum GFunction {
     Dwell,
     /// G9.
     ExactStopOnce,
+    /// G63: this block taps with a compensating chuck.
+    TapWithChuck,
     /// G17, G18, G19.
     Plane(Plane),
     /// G53, G153 (SUPA is a keyword).
@@ -75,11 +77,11 @@ pub enum Measure {
 }
 
 impl GFunction {
-    /// Its G group: two of one group cannot stand in one block. 0: no group (G4, G9, suppression).
+    /// Its G group: two of one group cannot stand in one block. 0: no group (G4, G9, G63, suppression).
     pub fn group(&self) -> u8 {
         match self {
             Self::Rapid | Self::Line | Self::Clockwise | Self::CounterClockwise | Self::Thread(_) => 1,
-            Self::Dwell | Self::ExactStopOnce | Self::SuppressFrames(_) => 0,
+            Self::Dwell | Self::ExactStopOnce | Self::TapWithChuck | Self::SuppressFrames(_) => 0,
             Self::AxialOffset(_) | Self::Pole(_) | Self::Limit(_) => 3,
             Self::ExactStopWindow(_) => 12,
             Self::FeedType(_) => 15,
@@ -102,6 +104,7 @@ pub fn g_function(number: u32) -> Result<GFunction, &'static str> {
         3 => GFunction::CounterClockwise,
         4 => GFunction::Dwell,
         9 => GFunction::ExactStopOnce,
+        63 => GFunction::TapWithChuck,
         17 => GFunction::Plane(Plane::G17),
         18 => GFunction::Plane(Plane::G18),
         19 => GFunction::Plane(Plane::G19),

@@ -4,7 +4,6 @@
 
 /// Words with what is missing, in groups.
 pub(super) const NOT_BUILT: &[(&[&str], &str)] = &[
-    (&["G63"], "tapping with a compensating chuck is not built yet: G331 and G332 tap without one"),
     (&["FZ"], "a feed for each tooth is not built yet: use F in mm/min with G94"),
     (
         &["TOFRAME", "TOROT", "TOROTX", "TOROTY", "TOROTZ", "TOFRAMEX", "TOFRAMEY", "TOFRAMEZ", "PAROT"],

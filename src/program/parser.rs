@@ -274,8 +274,8 @@ impl<'a> WordParser<'_, 'a, '_> {
             (b'S' | b'M' | b'T' | b'D' | b'H', _) => {
                 let value = self.address_value()?;
                 match (letter, number) {
-                    (b'S', Some(number @ 2..)) => Ok(WordKind::Address(Address::SpindleSpeedOf(number), value)),
-                    (b'M', Some(number @ 2..)) => Ok(WordKind::Address(Address::MOf(number), value)),
+                    (b'S', Some(number @ 1..)) => Ok(WordKind::Address(Address::SpindleSpeedOf(number), value)),
+                    (b'M', Some(number @ 1..)) => Ok(WordKind::Address(Address::MOf(number), value)),
                     _ => self.address(letter, value),
                 }
             }

@@ -286,6 +286,11 @@ pub enum Address {
     Turn,
     /// SF.
     StartAngle,
+    /// DITS: way in which a thread comes to its speed; DITE: in which it leaves it.
+    ThreadRun {
+        /// DITE.
+        leaves: bool,
+    },
     /// F.
     Feed,
     /// S.

@@ -92,6 +92,8 @@ pub(super) const ACTED_ON: &[(&str, Role)] = &[
     ("CR", Role::Address(Address::Radius)),
     ("TURN", Role::Address(Address::Turn)),
     ("SF", Role::Address(Address::StartAngle)),
+    ("DITS", Role::Address(Address::ThreadRun { leaves: false })),
+    ("DITE", Role::Address(Address::ThreadRun { leaves: true })),
     ("ADIS", Role::Address(Address::RoundingDistance)),
     ("ADISPOS", Role::Address(Address::RapidRoundingDistance)),
     ("CTOL", Role::Address(Address::ContourTolerance)),

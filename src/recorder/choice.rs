@@ -3,7 +3,7 @@
 //! In: the words of the user, the machine's axes. Out: [`SignalChoice`]. `/path` and `/event` are always recorded: without them
 //! no sample knows its line. A choice also says how often: at which rate of the drives, every how many samples. Does not thin out.
 
-use super::schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, SignalSource, TOOL_TOPICS};
+use super::schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, SPINDLE_FIELDS, SignalSource, TOOL_TOPICS};
 use crate::base::diagnostics::nearest;
 use crate::base::{AxisId, Diagnostic, PerAxis, SourceText, Span};
 use crate::machine::Machine;
@@ -50,10 +50,29 @@ pub struct SignalChoice {
     poses: [bool; TOOL_TOPICS.len()],
     /// Every how many samples of its axis a field is recorded.
     every: PerAxis<[u16; AXIS_FIELD_COUNT]>,
+    spindle: SpindleChoice,
     rate: RecordRate,
     decimation: NonZeroU32,
     until_rest: bool,
 }
+
+/// What of the master spindle is recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct SpindleChoice {
+    /// Bit i: field i of `SPINDLE_FIELDS`.
+    fields: u32,
+    /// Every how many set-points.
+    every: u16,
+}
+
+impl SpindleChoice {
+    fn of(fields: u32) -> Self {
+        Self { fields, every: 1 }
+    }
+}
+
+/// Bits of all fields of the spindle.
+const SPINDLE_ALL: u32 = (1 << SPINDLE_FIELDS.len()) - 1;
 
 /// Bits of all fields.
 const ALL_FIELDS: u32 = (1 << AXIS_FIELD_COUNT) - 1;
@@ -67,15 +86,16 @@ impl Default for SignalChoice {
 impl SignalChoice {
     /// Everything.
     pub fn all() -> Self {
-        Self::of(ALL_FIELDS, [true; TOOL_TOPICS.len()])
+        Self { spindle: SpindleChoice::of(SPINDLE_ALL), ..Self::of(ALL_FIELDS, [true; TOOL_TOPICS.len()]) }
     }
 
-    /// The same fields of every axis, every sample.
+    /// The same fields of every axis, every sample; no spindle.
     fn of(fields: u32, poses: [bool; TOOL_TOPICS.len()]) -> Self {
         Self {
             fields: PerAxis::splat(fields),
             poses,
             every: PerAxis::splat([1; AXIS_FIELD_COUNT]),
+            spindle: SpindleChoice::of(0),
             rate: RecordRate::Position,
             decimation: NonZeroU32::MIN,
             until_rest: false,
@@ -125,9 +145,10 @@ impl SignalChoice {
         groups
     }
 
-    /// What exists without drives: position, velocity, acceleration and jerk of the set-points, and the tool at the set-point.
+    /// What exists without drives: position, velocity, acceleration and jerk of the set-points, the tool at the set-point, and the spindle.
     pub fn setpoints() -> Self {
-        Self::of(fields_of(|source| source == SignalSource::Interpolator), [true, false])
+        let axes = Self::of(fields_of(|source| source == SignalSource::Interpolator), [true, false]);
+        Self { spindle: SpindleChoice::of(SPINDLE_ALL), ..axes }
     }
 
     /// What both choices hold, as often as this one says.
@@ -135,6 +156,7 @@ impl SignalChoice {
         Self {
             fields: PerAxis::from_fn(|axis| self.fields[axis] & other.fields[axis]),
             poses: std::array::from_fn(|i| self.poses[i] && other.poses[i]),
+            spindle: SpindleChoice { fields: self.spindle.fields & other.spindle.fields, ..self.spindle },
             ..*self
         }
     }
@@ -155,19 +177,25 @@ impl SignalChoice {
         self.poses[index]
     }
 
+    /// What of the spindle is chosen: bits of `SPINDLE_FIELDS`, 0 for nothing, and every how many set-points.
+    pub fn spindle(&self) -> (u32, u32) {
+        (self.spindle.fields, u32::from(self.spindle.every))
+    }
+
     /// What of this choice the machine can give: an axis whose drive the machine file does not describe has no motor.
     pub fn on(&self, machine: &Machine) -> Self {
         let mut fields = PerAxis::splat(0);
         for axis in machine.axis_ids() {
             fields[axis] = self.fields[axis] & existing_fields(machine, axis);
         }
-        Self { fields, ..*self }
+        let spindle = if machine.spindle.is_some() { self.spindle } else { SpindleChoice::of(0) };
+        Self { fields, spindle, ..*self }
     }
 
     /// Reads a list of words between commas. A word is `AXIS.FIELD`, where `*` stands for any axis, or for any part of a field
     /// name (with or without its unit); `AXIS` alone means all of its fields; `/10` behind it means every tenth sample, and of several
     /// words for one signal the most frequent counts; `tool`, `tool.setpoint` and `tool.actual` are the
-    /// poses; `path` and `event` may be named, and are recorded in any case.
+    /// poses; `spindle` and `spindle.FIELD` are the master spindle; `path` and `event` may be named, and are recorded in any case.
     pub fn parse(text: &str, machine: &Machine) -> Result<Self, Diagnostic> {
         let source = SourceText::new("--record", text);
         let mut choice = Self::of(0, [false; TOOL_TOPICS.len()]);
@@ -199,6 +227,9 @@ impl SignalChoice {
             None => (word, 1),
         };
         let (axis_name, pattern) = word.split_once('.').unwrap_or((word, "*"));
+        if axis_name.eq_ignore_ascii_case("spindle") {
+            return self.add_spindle(pattern, every, machine);
+        }
         let axes: Vec<AxisId> = match axis_name {
             "*" => machine.axis_ids().collect(),
             name => vec![machine.axis_by_name(name).ok_or_else(|| unknown_axis(name, machine))?],
@@ -226,6 +257,32 @@ impl SignalChoice {
             format!("`{word}` does not exist on this machine: the axis has no drive"),
             "give the axis `drive`, `motor` and `mechanics` in the machine file, or leave the signal out",
         ))
+    }
+}
+
+impl SignalChoice {
+    fn add_spindle(&mut self, pattern: &str, every: u16, machine: &Machine) -> Result<(), Unknown> {
+        let lower = pattern.to_ascii_lowercase();
+        // With or without its unit.
+        let stem =
+            |field: &'static str| field.rsplit_once('_').map_or(field, |(stem, _)| stem.trim_end_matches("_rot"));
+        let matches = |name: &str| matches_pattern(lower.as_bytes(), name.as_bytes());
+        let named = bits(SPINDLE_FIELDS.iter().map(|field| matches(field) || matches(stem(field))));
+        if named == 0 {
+            let stems = SPINDLE_FIELDS.map(stem).join(", ");
+            let message = format!("`{pattern}` is not a field of the spindle");
+            return Err(Unknown::new(message, format!("fields of the spindle: {stems}")));
+        }
+        if machine.spindle.is_none() {
+            return Err(Unknown::new(
+                "the spindle is not simulated on this machine",
+                "give the machine file `acceleration_rot_s2` in `[spindle]`, or leave the signal out",
+            ));
+        }
+        let before = self.spindle;
+        let every = if before.fields == 0 { every } else { every.min(before.every) };
+        self.spindle = SpindleChoice { fields: before.fields | named, every };
+        Ok(())
     }
 }
 
@@ -258,12 +315,12 @@ fn every(text: &str) -> Result<u16, Unknown> {
 fn unknown_axis(name: &str, machine: &Machine) -> Unknown {
     let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
     let known = names.join(", ");
-    let words = names.iter().copied().chain(["tool", "path", "event"]);
+    let words = names.iter().copied().chain(["tool", "path", "event", "spindle"]);
     let help = match nearest(name, words) {
         Some(word) => format!("did you mean `{word}`? Axes of this machine: {known}"),
         None => format!("axes of this machine: {known}"),
     };
-    Unknown::new(format!("`{name}` is neither an axis of this machine nor `tool`, `path` or `event`"), help)
+    Unknown::new(format!("`{name}` is neither an axis of this machine nor `tool`, `spindle`, `path` or `event`"), help)
 }
 
 fn unknown_field(pattern: &str) -> Unknown {

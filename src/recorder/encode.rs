@@ -110,12 +110,14 @@ pub(super) struct RunEncoder {
     axis_kinds: Vec<AxisKind>,
     programs: Vec<(ProgramId, Arc<str>)>,
     precision: Precision,
+    /// Bits of `SPINDLE_FIELDS`.
+    spindle_fields: u32,
     path: Path,
     pose: PoseInFrame,
 }
 
 impl RunEncoder {
-    pub(super) fn new(machine: &Machine, precision: Precision) -> Self {
+    pub(super) fn new(machine: &Machine, precision: Precision, spindle_fields: u32) -> Self {
         let name = |i: usize| machine.axes.get(i).map_or("", |axis| axis.name.as_str());
         let pose = PoseInFrame { frame_id: Some(POSE_FRAME.to_owned()), ..PoseInFrame::default() };
         Self {
@@ -123,6 +125,7 @@ impl RunEncoder {
             axis_kinds: machine.axes.iter().map(|axis| axis.kind).collect(),
             programs: Vec::new(),
             precision,
+            spindle_fields,
             path: Path::default(),
             pose,
         }
@@ -179,14 +182,16 @@ impl RunEncoder {
     }
 
     fn encode_spindle(&self, signals: &SpindleSignals, buffer: &mut Vec<u8>) {
-        let round = |value: f64| Some(self.precision.round(value));
+        let chosen =
+            |field: u32, value: f64| (self.spindle_fields & (1 << field) != 0).then(|| self.precision.round(value));
         let SpindleSignals { setpoint, angle_actual_rad, speed_actual_rad_s } = signals;
+        // In the order of `SPINDLE_FIELDS`.
         let message = Spindle {
-            angle_setpoint_deg: round(deg_from_rad(setpoint.angle_rad)),
-            angle_actual_deg: round(deg_from_rad(*angle_actual_rad)),
-            speed_setpoint_rpm: round(rpm_from_rad_s(setpoint.speed_rad_s)),
-            speed_actual_rpm: round(rpm_from_rad_s(*speed_actual_rad_s)),
-            acceleration_setpoint_rot_s2: round(rot_from_rad(setpoint.acceleration_rad_s2)),
+            angle_setpoint_deg: chosen(0, deg_from_rad(setpoint.angle_rad)),
+            angle_actual_deg: chosen(1, deg_from_rad(*angle_actual_rad)),
+            speed_setpoint_rpm: chosen(2, rpm_from_rad_s(setpoint.speed_rad_s)),
+            speed_actual_rpm: chosen(3, rpm_from_rad_s(*speed_actual_rad_s)),
+            acceleration_setpoint_rot_s2: chosen(4, rot_from_rad(setpoint.acceleration_rad_s2)),
         };
         message.encode_raw(buffer);
     }

@@ -78,6 +78,7 @@ impl From<&Event> for EventRecord {
             | Event::Synchronised(_)
             | Event::CancelSynchronised(_)
             | Event::SpindleWait
+            | Event::SpindleAcceleration { .. }
             | Event::Programmed(_) => Self::BlockStart,
         }
     }

@@ -1,13 +1,13 @@
 //! A recording as a table: CSV.
 //!
 //! In: a [`Recording`]. Out: one row for each instant at which an axis was recorded (each set-point in a recording without axes);
-//! axes with a longer cycle and the path are held. Numbers in the shortest form that reads back to the same f64; absent values
+//! axes with a longer cycle, the path and the spindle are held. Numbers in the shortest form that reads back to the same f64; absent values
 //! are empty. Memory holds one chunk and one row. Events and poses stay in the recording. Does not resample.
 
 use super::decode::{AxisSample, TopicKind};
 use super::reader::Recording;
-use super::schema::proto::sollwert::Path as PathMessage;
-use super::schema::{AXIS_FIELDS, FLAGS_FIELD, MONITORING_FIELD, PATH_FIELDS};
+use super::schema::proto::sollwert::{Path as PathMessage, Spindle as SpindleMessage};
+use super::schema::{AXIS_FIELDS, FLAGS_FIELD, MONITORING_FIELD, PATH_FIELDS, SPINDLE_FIELDS, spindle_values};
 use super::target::{Target, WholeFile};
 use crate::base::Diagnostic;
 use crate::base::units::NS_PER_S;
@@ -132,6 +132,14 @@ impl Table {
                     columns += topic.fields.len();
                     cells.push(Cells::empty(place, topic.fields.clone()));
                 }
+                TopicKind::Spindle if topic.messages > 0 => {
+                    for field in &topic.fields {
+                        header.push_str(",spindle.");
+                        header.push_str(SPINDLE_FIELDS[*field]);
+                    }
+                    columns += topic.fields.len();
+                    cells.push(Cells::empty(place, topic.fields.clone()));
+                }
                 TopicKind::Path if topic.messages > 0 => {
                     for field in PATH_FIELDS {
                         header.push_str(",path.");
@@ -172,6 +180,7 @@ impl Table {
                 cells.set_path(&PathMessage::decode(data)?);
                 self.due |= !self.axes_make_rows;
             }
+            TopicKind::Spindle => cells.set_spindle(&SpindleMessage::decode(data)?),
             _ => {}
         }
         Ok(())
@@ -210,6 +219,17 @@ impl Cells {
                 }
                 Some(value) => push_number(&mut self.text, value),
                 None => {}
+            }
+        }
+    }
+
+    fn set_spindle(&mut self, spindle: &SpindleMessage) {
+        self.text.clear();
+        let values = spindle_values(spindle);
+        for field in &self.fields {
+            self.text.push(b',');
+            if let Some(value) = values.get(*field).copied().flatten() {
+                push_number(&mut self.text, value);
             }
         }
     }

@@ -41,6 +41,7 @@ pub struct Recorder {
     attached: Vec<ProgramId>,
     axis_decimators: PerAxis<AxisDecimator>,
     path_decimator: Decimator,
+    records_spindle: bool,
     spindle_decimator: Decimator,
 }
 
@@ -90,7 +91,8 @@ impl Recorder {
             attached: setup.programs.iter().map(|program| program.id).collect(),
             axis_decimators: PerAxis::from_fn(|axis| AxisDecimator::new(&signals.groups(axis), every)),
             path_decimator: Decimator::new(every),
-            spindle_decimator: Decimator::new(every),
+            records_spindle: signals.spindle().0 != 0,
+            spindle_decimator: Decimator::new(every.saturating_mul(signals.spindle().1)),
         })
     }
 
@@ -113,8 +115,11 @@ impl Recorder {
         }
     }
 
-    /// The master spindle at a set-point; recorded where the machine file has one.
+    /// The master spindle at a set-point; recorded where the machine file has one and it is chosen.
     pub fn spindle(&mut self, tick: Tick, signals: &SpindleSignals) {
+        if !self.records_spindle {
+            return;
+        }
         if let Some(record) = self.spindle_decimator.pass(Record::Spindle { tick, signals: *signals }) {
             self.push(record);
         }
@@ -141,7 +146,11 @@ impl Recorder {
         }
         match event {
             Event::Programmed(block) => self.push(Record::Programmed { tick, block: block.clone() }),
-            Event::Position(_) | Event::Synchronised(_) | Event::CancelSynchronised(_) | Event::SpindleWait => {}
+            Event::Position(_)
+            | Event::Synchronised(_)
+            | Event::CancelSynchronised(_)
+            | Event::SpindleWait
+            | Event::SpindleAcceleration { .. } => {}
             Event::SpindlePosition(positioning) if positioning.text.is_empty() => {}
             _ => self.event(tick, Some(block), event.into()),
         }

@@ -30,7 +30,7 @@ pub(crate) use export::{push_number, push_text};
 pub use front::Recorder;
 pub use reader::{Message, Messages, Recording, Topic};
 pub use recover::{RECOVERED_METADATA, RecoverReport, recover};
-pub use schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, PATH_FIELDS, ToolPose, axis_field};
+pub use schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, PATH_FIELDS, SPINDLE_FIELDS, ToolPose, axis_field, spindle_values};
 pub use setup::{
     ABOUT_METADATA, AXES_METADATA, CYCLE_METADATA, Compression, INPUTS_METADATA, MACHINE_MEDIA_TYPE,
     PROGRAM_MEDIA_TYPE, RecordingSetup, SUMMARY_METADATA, UNITS_METADATA,

@@ -7,7 +7,7 @@
 use super::contents::{AttachmentInfo, Contents, attachment_data};
 use super::decode::{Content, TopicKind};
 use super::records::{ChunkHead, Damage, FRAME_HEAD_BYTES, Frame, RawMessage, Records, Stop, Unpacker, inner_record};
-use super::schema::{AXIS_FIELDS, RECORDING_FORMAT};
+use super::schema::{AXIS_FIELDS, RECORDING_FORMAT, SPINDLE_FIELDS};
 use super::setup::{ABOUT_METADATA, MACHINE_MEDIA_TYPE, PROGRAM_MEDIA_TYPE, SUMMARY_METADATA};
 use crate::base::units::NS_PER_S;
 use crate::base::{AxisKind, Diagnostic};
@@ -30,7 +30,7 @@ pub struct Topic {
     pub kind: TopicKind,
     /// Messages on it.
     pub messages: u64,
-    /// Recorded fields of an axis, by their place in `AXIS_FIELDS`; empty for other topics.
+    /// Recorded fields of an axis, by their place in `AXIS_FIELDS`, of the spindle in `SPINDLE_FIELDS`; empty for other topics.
     pub fields: Vec<usize>,
 }
 
@@ -190,10 +190,15 @@ fn topics(contents: &Contents) -> Vec<Topic> {
 
 /// The fields that the channel says it has; all fields where it does not say.
 fn recorded_fields(kind: &TopicKind, metadata: &BTreeMap<String, String>) -> Vec<usize> {
-    let TopicKind::Axis { kind, .. } = kind else { return Vec::new() };
     let listed = metadata.get("fields");
     let said = |name: &str| listed.is_none_or(|fields| fields.split(',').any(|field| field == name));
-    AXIS_FIELDS.iter().enumerate().filter(|(_, field)| said(field.name(*kind))).map(|(i, _)| i).collect()
+    match kind {
+        TopicKind::Axis { kind, .. } => {
+            AXIS_FIELDS.iter().enumerate().filter(|(_, field)| said(field.name(*kind))).map(|(i, _)| i).collect()
+        }
+        TopicKind::Spindle => (0..SPINDLE_FIELDS.len()).filter(|field| said(SPINDLE_FIELDS[*field])).collect(),
+        _ => Vec::new(),
+    }
 }
 
 fn merged(records: Vec<mcap::records::Metadata>) -> BTreeMap<String, BTreeMap<String, String>> {

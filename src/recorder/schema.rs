@@ -116,6 +116,26 @@ pub const PATH_FIELDS: [&str; 14] = [
     "override_ratio",
 ];
 
+/// Fields of `sollwert.Spindle`, in the order of the message and of the columns of an export.
+pub const SPINDLE_FIELDS: [&str; 5] = [
+    "angle_setpoint_deg",
+    "angle_actual_deg",
+    "speed_setpoint_rpm",
+    "speed_actual_rpm",
+    "acceleration_setpoint_rot_s2",
+];
+
+/// Values of a message in the order of [`SPINDLE_FIELDS`].
+pub fn spindle_values(message: &proto::sollwert::Spindle) -> [Option<f64>; SPINDLE_FIELDS.len()] {
+    [
+        message.angle_setpoint_deg,
+        message.angle_actual_deg,
+        message.speed_setpoint_rpm,
+        message.speed_actual_rpm,
+        message.acceleration_setpoint_rot_s2,
+    ]
+}
+
 /// Who makes a signal: decides which signals exist without drives, or on an axis whose drive the machine file does not describe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SignalSource {

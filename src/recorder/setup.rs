@@ -4,7 +4,7 @@
 //! equal inputs give equal bytes.
 
 use super::choice::SignalChoice;
-use super::schema::{AXIS_FIELDS, RECORDING_FORMAT};
+use super::schema::{AXIS_FIELDS, RECORDING_FORMAT, SPINDLE_FIELDS};
 use crate::base::AxisKind;
 use crate::machine::{Axis, Machine};
 use crate::program::{OpenedProgram, ProgramText};
@@ -185,6 +185,13 @@ impl<'a> RecordingSetup<'a> {
             ("kind".to_owned(), kind_name(axis.kind).to_owned()),
             ("fields".to_owned(), names.join(",")),
         ])
+    }
+
+    /// Metadata of the channel of the spindle; `fields`: bits of `SPINDLE_FIELDS`.
+    pub(super) fn spindle_channel(fields: u32) -> BTreeMap<String, String> {
+        let names = SPINDLE_FIELDS.iter().enumerate().filter(|(field, _)| fields & (1 << field) != 0);
+        let names: Vec<&str> = names.map(|(_, name)| *name).collect();
+        BTreeMap::from([("fields".to_owned(), names.join(","))])
     }
 }
 

@@ -91,6 +91,11 @@ impl WholeFile {
         }
     }
 
+    /// Nothing is under its name before it is complete: no device or pipe.
+    pub(crate) fn is_replaced(&self) -> bool {
+        self.temporary.is_some()
+    }
+
     /// Completes the bytes and gives the file its name.
     pub(crate) fn commit(mut self, mut target: Target) -> Result<u64, Diagnostic> {
         target.complete().map_err(|error| self.fault(&error))?;

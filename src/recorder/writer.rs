@@ -100,7 +100,7 @@ impl RecordingWriter {
         });
         let file = prelude.map_err(|error| write_fault(&name, &error.into()))?;
         let precision = Precision::new(setup.mantissa_bits);
-        let mut run_encoder = RunEncoder::new(setup.machine, precision);
+        let mut run_encoder = RunEncoder::new(setup.machine, precision, setup.signals.on(setup.machine).spindle().0);
         for program in setup.programs {
             run_encoder.add_program(program.id, &program.name);
         }
@@ -264,8 +264,8 @@ fn topics(setup: &RecordingSetup) -> (Topics, Declarations) {
     let nothing = BTreeMap::new();
     let path = add(PATH_TOPIC, PATH, &nothing);
     let event = add(EVENT_TOPIC, EVENT, &nothing);
-    let spindle =
-        (setup.machine.spindle.is_some() && !setup.programs.is_empty()).then(|| add(SPINDLE_TOPIC, SPINDLE, &nothing));
+    let spindle = (signals.spindle().0 != 0 && !setup.programs.is_empty())
+        .then(|| add(SPINDLE_TOPIC, SPINDLE, &RecordingSetup::spindle_channel(signals.spindle().0)));
     let mut poses = [None; TOOL_TOPICS.len()];
     for (index, topic) in TOOL_TOPICS.into_iter().enumerate().filter(|(index, _)| signals.pose(*index)) {
         poses[index] = Some(add(topic, POSE_IN_FRAME, &nothing));

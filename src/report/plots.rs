@@ -5,7 +5,7 @@
 
 use super::bands::is_constant;
 use crate::compare::{Alignment, Comparison, Part, Series, Side};
-use crate::trace::{Signal, TimeGrid, Trace};
+use crate::trace::{AxisSignal, Signal, TimeGrid, Trace};
 
 /// Curves of one plot at most: more cannot be told apart.
 const SIGNALS_MAX: usize = 24;
@@ -80,7 +80,7 @@ impl Samples<'_> {
 }
 
 /// Title, and the fields (of axes without unit, of the path with it) in it; `true` = dashed.
-const GROUPS: [(&str, &[(&str, bool)]); 12] = [
+const GROUPS: [(&str, &[(&str, bool)]); 14] = [
     ("Feed", &[("path.feed_mm_min", false), ("path.programmed_feed_mm_min", true)]),
     ("Contour error", &[("path.contour_error_mm", false)]),
     ("Control deviation", &[("control_deviation", false)]),
@@ -117,6 +117,8 @@ const GROUPS: [(&str, &[(&str, bool)]); 12] = [
     ("Current", &[("current", false), ("current_mean", false), ("current_reference", true)]),
     ("Motor speed", &[("motor_speed", false), ("motor_speed_reference", true)]),
     ("Voltage", &[("voltage", false)]),
+    ("Spindle speed", &[("spindle.speed_actual_rpm", false), ("spindle.speed_setpoint_rpm", true)]),
+    ("Spindle angle", &[("spindle.angle_actual_deg", false), ("spindle.angle_setpoint_deg", true)]),
 ];
 
 /// Fields that are in a plot but not shown at first: they say nearly the same as another.
@@ -146,7 +148,10 @@ pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &C
                     if rank > 0 && side.is_some_and(|side| repeats(side, signal, leading)) {
                         continue;
                     }
-                    let shown = !HIDDEN.contains(field) || rank == 0;
+                    // What says nearly the same as another is hidden where there is the other.
+                    let alone =
+                        |own: AxisSignal<'_>| side.is_some_and(|side| side.axis_signal(own.axis, leading).is_none());
+                    let shown = !HIDDEN.contains(field) || rank == 0 || signal.axis_signal().is_some_and(alone);
                     add(&mut plots, title, curve(signal, *dashed || of_reference, shown, of_reference), &signal.unit);
                 }
             }
@@ -156,12 +161,17 @@ pub fn plots<'a>(trace: &'a Trace, side: &Side, reference: Option<(&'a Trace, &C
     let sides = [Some(trace), reference.map(|(other, _)| other)];
     for (side, of_reference) in sides.into_iter().zip([false, true]) {
         for signal in side.into_iter().flat_map(|side| &side.signals) {
-            let path = signal.name.as_deref().is_some_and(|name| name.starts_with("path.") || name.ends_with(".flags"));
+            let path = signal.name.as_deref().is_some_and(|name| {
+                name.starts_with("path.") || name.starts_with("spindle.") || name.ends_with(".flags")
+            });
             if !known(signal) && !path && signal.labels.is_empty() {
                 add(&mut plots, "Other signals", curve(signal, of_reference, true, of_reference), &signal.unit);
             }
         }
     }
+    // Axes that rest in a simulation and are not in the control's trace at all.
+    let of_interest = |curve: &Curve<'_>| !curve.of_reference || !is_constant(&curve.samples.series());
+    plots.retain(|plot| plot.curves.iter().any(of_interest));
     add_budget(&mut plots, side);
     let mut room = CURVES_MAX;
     let mut left_out = 0;
@@ -210,6 +220,11 @@ fn is_of(signal: &Signal, field: &str) -> bool {
     if field.starts_with("path.") {
         return signal.name.as_deref() == Some(field) && signal.values.iter().any(|value| value.is_finite());
     }
+    if field.starts_with("spindle.") {
+        // A spindle that stands all along says nothing.
+        return signal.name.as_deref() == Some(field)
+            && signal.values.iter().any(|value| value.is_finite() && *value != 0.0);
+    }
     signal.axis_signal().is_some_and(|own| own.stem() == field) && signal.values.iter().any(|value| value.is_finite())
 }
 
@@ -251,6 +266,13 @@ fn differences<'a>(trace: &'a Trace, reference: &'a Trace, comparison: &Comparis
             None => "Difference".to_owned(),
         };
         add(&mut plots, &title, curve, &pair.unit);
+    }
+    // A plot of zeros tells nothing that the table does not say; where all are zero, that is what is to be seen.
+    let differs = |plot: &Plot<'_>| {
+        plot.curves.iter().any(|curve| matches!(&curve.samples, Samples::Made { values, .. } if values.iter().any(|v| *v != 0.0 && !v.is_nan())))
+    };
+    if plots.iter().any(differs) {
+        plots.retain(differs);
     }
     plots
 }

@@ -158,13 +158,22 @@ impl Sheet<'_> {
         }
         let lines = Lines::of(self.trace).or(reference.map_or_else(Lines::default, |(other, _)| Lines::of(other)), at);
         let limits = Strip::of_limits(self.trace);
+        // The reference may go on longer: what limits the feed, and which line is active, is known as long as the trace lasts.
+        let end_of = |trace: &Trace, place: &dyn Fn(f64) -> f64| trace.span_s().map(|(_, end_s)| place(end_s));
+        let end_s = end_of(self.trace, &|t| t).unwrap_or(span_s.1);
+        let lines_end_s = match reference {
+            Some((other, _)) if Lines::of(self.trace).is_empty() => {
+                end_of(other, &|t| at.trace_s(t)).unwrap_or(span_s.1)
+            }
+            _ => end_s,
+        };
         json!({
             "start": span_s.0, "end": span_s.1,
             "plots": plots_json,
             "banded": banded,
             "left_out": left_out,
-            "limits": if limits.is_empty() { Value::Null } else { limits.json(span_s.1, true) },
-            "lines": if lines.is_empty() { Value::Null } else { Strip::of_lines(&lines).json(span_s.1, false) },
+            "limits": if limits.is_empty() { Value::Null } else { limits.json(end_s, true) },
+            "lines": if lines.is_empty() { Value::Null } else { Strip::of_lines(&lines).json(lines_end_s, false) },
             "path": self.path(&at),
             "programs": self.programs(),
         })

@@ -169,17 +169,23 @@ pub fn comparison_tables(comparison: &Comparison) -> String {
         rows.extend(found.contour.plane.iter().map(|plane| contour_row(format!("in {}, left +", found.plane), plane)));
         html += &table("Contour error, trace against reference", &rows);
     }
+    // What is short and says most comes first; recordings share a hundred signals.
+    html += &(side_tables(a, ", trace") + &side_tables(b, ", reference"));
+    html += &line_table(&comparison.lines);
     html += &pair_table("Differences at equal times (trace − reference)", &comparison.pairs, |p| p.in_time.as_ref());
     html += &pair_table("Differences at equal places on the path", &comparison.pairs, |p| p.along_path.as_ref());
-    html += &line_table(&comparison.lines);
     let mut why = vec![row(&["signal of the trace", "signal of the reference", "why they are a pair"])];
     why.extend(comparison.pairs.iter().map(|p| vec![p.name.clone(), p.reference_name.clone(), p.reason.clone()]));
-    html += &table("Pairs", &why);
-    html + &side_tables(a, ", trace") + &side_tables(b, ", reference")
+    let summary = format!("Pairs of signals ({})", comparison.pairs.len());
+    html + &format!("<details><summary>{summary}</summary>{}</details>", table("", &why))
 }
 
 fn pair_table(caption: &str, pairs: &[PairFigures], get: impl Fn(&PairFigures) -> Option<&Figures>) -> String {
-    table(caption, &pair_rows(pairs, get, &|time_s| format!("{time_s:.3} s")))
+    let mut rows = pair_rows(pairs, get, &|time_s| format!("{time_s:.3} s"));
+    for unit in rows.iter_mut().filter_map(|row| row.last_mut()) {
+        *unit = unit.replace("^2", "²").replace("^3", "³");
+    }
+    table(caption, &rows)
 }
 
 fn line_table(lines: &[LineTimes]) -> String {

@@ -5,13 +5,14 @@
 
 use super::delimited::Dialect;
 use super::naming::{AxisMark, Named, NamedHead, Naming, operate_name};
+use super::recording::{SPINDLE_PREFIX, path_unit, spindle_unit};
 use super::signal_map::rule_for;
 use super::sink::{Head, Layout};
 use super::time_column::TimeColumn;
 use super::unit_words::{unit_and_factor, unit_in_name};
 use super::wire::{AxisSignal, Clock, TraceFormat, axis_signal_name};
 use crate::base::AxisKind;
-use crate::recorder::{AXIS_FIELDS, PATH_FIELDS};
+use crate::recorder::{AXIS_FIELDS, PATH_FIELDS, SPINDLE_FIELDS};
 use std::collections::BTreeMap;
 
 /// A column that becomes a signal.
@@ -109,6 +110,9 @@ fn own_name(name: &str) -> Option<String> {
     if let Some(field) = name.strip_prefix("path.") {
         return PATH_FIELDS.contains(&field).then(|| name.to_owned());
     }
+    if let Some(field) = name.strip_prefix(SPINDLE_PREFIX) {
+        return SPINDLE_FIELDS.contains(&field).then(|| name.to_owned());
+    }
     let (axis, unit) = name.rsplit_once('_')?;
     let is_axis = axis.starts_with(|c: char| c.is_ascii_uppercase()) && axis.len() <= 3;
     match unit {
@@ -121,7 +125,8 @@ fn own_name(name: &str) -> Option<String> {
 fn own_unit(name: &str) -> &'static str {
     match AxisSignal::parse(name) {
         Some(signal) => AXIS_FIELDS[signal.field].unit_name(signal.kind),
-        None => super::recording::path_unit(name),
+        None if name.starts_with(SPINDLE_PREFIX) => spindle_unit(name),
+        None => path_unit(name),
     }
 }
 

@@ -5,12 +5,12 @@
 
 use super::columns::{Column, describe_columns};
 use super::delimited::{Dialect, LOOK_AHEAD_LINES, cells};
-use super::faults::Faults;
+use super::faults::{Faults, against_time};
 use super::import::{About, ImportOptions};
 use super::naming::Naming;
 use super::sink::Sink;
 use super::source::{PartReader, Source};
-use super::time_column::TimeColumn;
+use super::time_column::{NOT_LATER, Refused, TimeColumn};
 use super::wire::{Origin, TraceFormat};
 use crate::base::Diagnostic;
 use std::collections::BTreeMap;
@@ -79,7 +79,14 @@ impl Reading<'_> {
         let names = self.names();
         let units = self.dialect.units.map(|line| self.row_cells(line));
         let sample: Vec<Vec<String>> = (self.dialect.data..self.first_lines.len()).map(|l| self.row_cells(l)).collect();
-        let time = TimeColumn::find(&names, units.as_deref(), &sample, &self.dialect, options, &shown)?;
+        let time = TimeColumn::find(&names, units.as_deref(), &sample, &self.dialect, options, &shown);
+        let time = time.map_err(|Refused { finding, row }| {
+            let at = row.and_then(|row| self.starts.get(self.dialect.data + row));
+            match at.and_then(|at| self.source.place(self.part, *at, "this row is not later than the one before")) {
+                Some(place) => finding.at(place),
+                None => finding,
+            }
+        })?;
         let mut naming = Naming::new(TraceFormat::Csv, options);
         let columns = describe_columns(&names, units.as_deref(), &sample, &self.dialect, &time, &mut naming);
         let heads: Vec<_> = columns.iter().map(|column| column.head.clone()).collect();
@@ -101,6 +108,13 @@ impl Reading<'_> {
         if count == 0 {
             let message = format!("{shown} has no row with a time and a number");
             return Err(Diagnostic::error("T0003", message));
+        }
+        let (late, at) = faults.of("T0009", NOT_LATER);
+        if let Some(finding) = against_time(late, count, &shown) {
+            return Err(match self.source.place(self.part, at, "the first one") {
+                Some(place) => finding.at(place),
+                None => finding,
+            });
         }
         self.about(naming, &time, &faults, reader.encoding_remark(), &shown)
     }

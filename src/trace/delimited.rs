@@ -39,6 +39,12 @@ impl Dialect {
         })?;
         let columns = rows[data..].iter().map(Vec::len).max()?;
         let explained = rows[data..].iter().filter(|row| row.len() == columns && numeric(row, separator)).count();
+        // One column needs no separator: lines of numbers, and nothing else, or any text with a number in it would be a table.
+        let lonely =
+            columns == 1 && (2 * explained < rows.len() || lines[data..].iter().any(|l| l.contains([';', '\t'])));
+        if lonely {
+            return None;
+        }
         let decimal_comma = separator != ',' && rows[data..].iter().flatten().any(|cell| is_decimal_comma(cell));
         let above =
             |at: usize| at.checked_sub(1).filter(|at| rows[*at].len().abs_diff(columns) <= 1 && names(&rows[*at]));

@@ -1,25 +1,27 @@
 //! SINUMERIK Edge / Data Recorder JSON -> rows and events.
 //!
 //! In: Header, Payload, Footer, in one file or in a chain of files (a folder, a zip). Out: one row a position cycle for a [`Sink`], the
-//! block starts as events, `path.line`, and the numbers of LFData, each held until the next. Time is the counter of position cycles times its
-//! period (`CycleTimeMs`, or as the time stamps say); a cycle that is missing is a gap. Streams: memory holds one row, one event and what of
-//! LFData waits for its row. A low-frequency value whose row has passed comes with the next one, and how late is said. Texts of LFData,
-//! calls and external data are passed over.
+//! block starts and calls as events, `path.line`, and the values of LFData, each held until the next. Names of axes are those of the header where
+//! the user gave none. Time is the counter of position cycles times its period (`CycleTimeMs`, or as the time stamps say); a cycle that is
+//! missing is a gap. Streams: memory holds one row, one event and what of LFData waits for its row. A low-frequency value whose row has passed
+//! comes with the next one, and how late is said. External data are passed over.
 
 use super::columns::taken_apart;
 use super::edge_low::LowSignals;
-use super::edge_payload::{Element, Payload, period_by_stamps};
-use super::faults::Faults;
+use super::edge_payload::{Element, Payload, period_by_stamps, text_addresses};
+use super::faults::{Faults, against_time};
 use super::import::{About, ImportOptions};
+use super::instants::shifted;
 use super::naming::{NamedHead, Naming};
 use super::sink::{Head, Layout, Sink};
 use super::source::{Source, unreadable};
+use super::time_column::NOT_LATER;
 use super::wire::{Clock, Origin, TraceEvent, TraceFormat};
 use crate::base::Diagnostic;
 use crate::base::units::{MS_PER_S, NS_PER_S};
 use crate::recorder::schema::proto::sollwert::Event;
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Counters wrap here.
 const COUNTER_WRAP: i64 = 1 << 31;
@@ -45,6 +47,7 @@ pub(super) fn read_edge(source: &Source, options: &ImportOptions, sink: &mut dyn
         period_s: USUAL_PERIOD_S,
         first: None,
         unwrapped: 0,
+        initial: None,
         last: None,
         stride: None,
         last_event: None,
@@ -76,6 +79,8 @@ struct Recorder<'s> {
     /// Counter of the first row, and what is to be added to counters since they wrapped.
     first: Option<i64>,
     unwrapped: i64,
+    /// Counter at the start that the header tells.
+    initial: Option<i64>,
     /// Counter of the last row.
     last: Option<i64>,
     /// Cycles from row to row.
@@ -100,10 +105,11 @@ impl Recorder<'_> {
                 Some(Element::Header(header)) => self.header(part, &header)?,
                 Some(Element::Row(row)) => self.row(&row)?,
                 Some(Element::Block(block)) => self.block(&block)?,
-                Some(Element::Low(values)) => self.low.take(&values, &mut self.faults),
+                Some(Element::Call(call)) => self.call(&call)?,
+                Some(Element::Low(values)) => self.low.take(&values, &mut self.faults, self.sink),
                 Some(Element::Other(sort)) => {
                     if sort != "HFTimestamp" {
-                        self.faults.count("T0008", "call and external data are passed over", 0);
+                        self.faults.count("T0008", "external data are passed over", 0);
                     }
                 }
                 None => break,
@@ -148,6 +154,7 @@ impl Recorder<'_> {
             Some(period_ms) => period_ms / MS_PER_S,
             None => self.guess_period(part)?,
         };
+        self.name_axes(header);
         let mut heads: Vec<NamedHead> = Vec::new();
         for name in &names {
             if name == CYCLE {
@@ -172,9 +179,23 @@ impl Recorder<'_> {
             layout: Layout::Dense,
             ..Head::default()
         });
-        let low = self.low.begin(header, heads.len(), &mut self.naming);
+        let low = header.get("SignalListLFData").and_then(Value::as_array).map_or(0, Vec::len);
+        let texts = if low > 0 { text_addresses(self.source.read(part)?.unlimited(), low) } else { BTreeSet::new() };
+        let low = self.low.begin(header, heads.len(), &texts, &mut self.naming);
         heads.extend(low);
         self.sink.begin(&heads)
+    }
+
+    /// The header tells names of axes: they hold where the user gives none.
+    fn name_axes(&mut self, header: &Value) {
+        let names = axis_names(header);
+        let said: Vec<String> =
+            names.iter().map(|(number, (said, name))| format!("{number} = {name} ({said})")).collect();
+        self.naming.of_file = names.into_iter().map(|(number, (_, name))| (number, name)).collect();
+        if !said.is_empty() {
+            let message = format!("names of axes by the header of the file: {}", said.join(", "));
+            self.naming.notes.push(Diagnostic::note("T0011", message).help("--axis-name 1=X gives others"));
+        }
     }
 
     fn remember(&mut self, header: &Value) {
@@ -184,9 +205,11 @@ impl Recorder<'_> {
                 self.metadata.insert(key.to_owned(), value.to_owned());
             }
         }
-        if let Some(time) = header.get("Initial").and_then(|initial| initial.get("Time")).and_then(Value::as_str) {
+        let initial = header.get("Initial");
+        if let Some(time) = initial.and_then(|initial| initial.get("Time")).and_then(Value::as_str) {
             self.metadata.insert("start".to_owned(), time.to_owned());
         }
+        self.initial = initial.and_then(counter);
     }
 
     fn guess_period(&mut self, part: usize) -> Result<f64, Diagnostic> {
@@ -238,7 +261,7 @@ impl Recorder<'_> {
         let first = *self.first.get_or_insert(0);
         if let Some(last) = self.last.map(|last| last - first) {
             if count <= last {
-                self.faults.count("T0009", "a row is not later than the one before and is left out", 0);
+                self.faults.count("T0009", NOT_LATER, 0);
                 return Ok(());
             }
             let stride = *self.stride.get_or_insert(count - last);
@@ -263,7 +286,7 @@ impl Recorder<'_> {
     }
 
     fn block(&mut self, block: &Value) -> Result<(), Diagnostic> {
-        let counter = block.get("HFProbeCounter").or_else(|| block.get("HfProbeCounter")).and_then(Value::as_i64);
+        let counter = counter(block);
         let line = block.get("SeekOffset").and_then(Value::as_u64).and_then(|line| u32::try_from(line).ok());
         let Some(counter) = counter else { return Ok(()) };
         // The last event of a file stands again at the beginning of the next.
@@ -272,20 +295,36 @@ impl Recorder<'_> {
         }
         self.last_event = Some((counter, line));
         self.line = line.map_or(self.line, f64::from);
-        // Events before the first row belong to its time.
-        let count = match self.first {
-            Some(first) => counter + self.unwrapped - first,
-            None => 0,
-        };
+        let time_s = self.event_s(counter);
         let text = block.get("GCode").and_then(Value::as_str).map(str::to_owned);
         let event = Event { kind: Some("block_start".to_owned()), text, line, ..Event::default() };
-        self.sink.event(TraceEvent { time_s: self.time_s(count.max(0)), event })
+        self.sink.event(TraceEvent { time_s, event })
+    }
+
+    /// Time of an event; one before the first row belongs to its time.
+    fn event_s(&self, counter: i64) -> f64 {
+        let count = self.first.map_or(0, |first| counter.saturating_add(self.unwrapped - first));
+        self.time_s(count.max(0))
+    }
+
+    /// A program was called, or returned to.
+    fn call(&mut self, call: &Value) -> Result<(), Diagnostic> {
+        let Some(counter) = counter(call) else { return Ok(()) };
+        let line = call.get("SeekOffset").and_then(Value::as_u64).and_then(|line| u32::try_from(line).ok());
+        let path = call.get("Path").or_else(|| call.get("path")).and_then(Value::as_str).map(str::to_owned);
+        let event = Event { kind: Some("call".to_owned()), program: path, line, ..Event::default() };
+        let time_s = self.event_s(counter);
+        self.sink.event(TraceEvent { time_s, event })
     }
 
     fn finish(mut self) -> Result<About, Diagnostic> {
         if self.rows == 0 {
             let message = format!("{} has no rows of HFData", self.source.shown);
             return Err(Diagnostic::error("T0003", message));
+        }
+        let (late, _) = self.faults.of("T0009", NOT_LATER);
+        if let Some(finding) = against_time(late, self.rows, &self.source.shown) {
+            return Err(finding);
         }
         let mut notes = std::mem::take(&mut self.naming.notes);
         notes.extend(self.faults.findings(|code, message, _| Diagnostic::warning(code, message)));
@@ -296,7 +335,9 @@ impl Recorder<'_> {
                 format!("values of LFData came up to {late_ms:.0} ms after their time, and stand there"),
             )
         }));
-        let start_utc = self.metadata.get("start").cloned();
+        // The header tells the start of the job; rows begin when the trigger comes.
+        let later_s = self.first.zip(self.initial).map_or(0.0, |(first, initial)| self.time_s(first - initial));
+        let start_utc = self.metadata.get("start").and_then(|start| shifted(start, later_s).or(Some(start.clone())));
         let format = TraceFormat::EdgeJson;
         Ok(About {
             origin: Origin { format, description: format.title().to_owned(), start_utc },
@@ -304,6 +345,35 @@ impl Recorder<'_> {
             notes,
         })
     }
+}
+
+fn counter(value: &Value) -> Option<i64> {
+    value.get("HFProbeCounter").or_else(|| value.get("HfProbeCounter")).and_then(Value::as_i64)
+}
+
+/// Names of the axes by number: as the header has them (`X1`), and as they are called here. A geometry axis is called by its letter alone, as
+/// programs do.
+fn axis_names(header: &Value) -> BTreeMap<u32, (String, String)> {
+    let mut said: BTreeMap<u32, String> = BTreeMap::new();
+    for entry in header.get("SignalListHFData").and_then(Value::as_array).into_iter().flatten() {
+        let text = |key: &str| entry.get(key).and_then(Value::as_str).map(str::trim).filter(|text| !text.is_empty());
+        let number = text("Address").and_then(|address| address.rsplit_once('|')?.1.trim().parse::<u32>().ok());
+        if let (Some(number), Some(name)) = (number, text("Axis")) {
+            said.entry(number).or_insert_with(|| name.to_owned());
+        }
+    }
+    let sane = |name: &str| {
+        name.len() <= 16
+            && name.starts_with(|c: char| c.is_ascii_alphabetic())
+            && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
+    };
+    said.retain(|_, name| sane(name));
+    let taken: BTreeSet<String> = said.values().cloned().collect();
+    let called = |name: &str| {
+        let letter = name.strip_suffix('1').filter(|letter| letter.len() == 1 && !taken.contains(*letter));
+        letter.unwrap_or(name).to_owned()
+    };
+    said.iter().map(|(number, name)| (*number, (name.clone(), called(name)))).collect()
 }
 
 /// Addresses of the columns: `ENC_POS|1`; the name where there is no address.

@@ -5,10 +5,13 @@
 //! rows are handed to serde_json, at most [`VALUE_BYTES_MAX`] long.
 
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::io::{self, BufRead};
 
 /// Longest value that is read whole: a header with thousands of signals has some 100 KB.
 const VALUE_BYTES_MAX: usize = 16 << 20;
+/// Bytes that are looked at to know which signals are texts.
+const LOOK_AHEAD_BYTES: u64 = 32 << 20;
 /// Values of a row.
 const ROW_MAX: usize = 100_000;
 /// Nesting of values that are passed over.
@@ -23,6 +26,8 @@ pub(super) enum Element {
     Row(Vec<f64>),
     /// HFBlockEvent.
     Block(Value),
+    /// HFCallEvent.
+    Call(Value),
     /// LFData.
     Low(Value),
     /// Anything else, by its key.
@@ -160,6 +165,7 @@ impl<R: BufRead> Payload<R> {
                         Ok(None)
                     }
                     "HFBlockEvent" => Ok(Some(Element::Block(self.value()?))),
+                    "HFCallEvent" => Ok(Some(Element::Call(self.value()?))),
                     "LFData" => Ok(Some(Element::Low(self.value()?))),
                     "HFTimestamp" | "HfTimestamp" => Ok(Some(Element::Other(self.stamp()?))),
                     _ => {
@@ -355,6 +361,23 @@ pub(super) fn period_by_stamps(reader: impl BufRead) -> Option<f64> {
     let near = (rounded_s - period_s).abs() < 0.01 * period_s;
     let period_s = if near { rounded_s } else { period_s };
     (period_s.is_finite() && (1e-5..10.0).contains(&period_s)).then_some(period_s)
+}
+
+/// Addresses of LFData whose values are texts. Reads until each of so many addresses has come once, or so many bytes.
+pub(super) fn text_addresses(reader: impl BufRead, addresses: usize) -> BTreeSet<String> {
+    let mut payload = Payload::new(reader);
+    let (mut seen, mut texts) = (BTreeSet::new(), BTreeSet::new());
+    while seen.len() < addresses && payload.byte < LOOK_AHEAD_BYTES {
+        // What is wrong with the file is said by the reading that follows.
+        let Ok(Some(element)) = payload.next() else { break };
+        let Element::Low(values) = element else { continue };
+        for entry in values.as_array().map_or(std::slice::from_ref(&values), Vec::as_slice) {
+            let address = entry.get("address").or_else(|| entry.get("Address")).and_then(Value::as_str);
+            seen.extend(address.map(str::to_owned));
+            texts.extend(super::edge_low::text_address(entry).map(str::to_owned));
+        }
+    }
+    texts
 }
 
 struct Stamps<R> {

@@ -9,6 +9,17 @@ pub(super) const TIME_MAX_S: f64 = 1e10;
 /// Sorts of faults that are kept apart.
 const SORTS_MAX: usize = 32;
 
+/// What is wrong with a file of which more is left out than taken, because its time does not run forward.
+pub(super) fn against_time(left_out: u64, taken: u64, shown: &str) -> Option<Diagnostic> {
+    (left_out > taken).then(|| {
+        let all = left_out + taken;
+        let message = format!(
+            "{left_out} of {all} samples of {shown} are not later than the one before: its time runs backwards, or has too few digits"
+        );
+        Diagnostic::error("T0009", message).help("sort the samples by time; of a table --time 0.002 gives the distance of its rows in s instead")
+    })
+}
+
 /// Counts.
 #[derive(Debug, Default)]
 pub(super) struct Faults {
@@ -23,6 +34,12 @@ impl Faults {
         } else if self.sorts.len() < SORTS_MAX {
             self.sorts.push((code, message, 1, byte));
         }
+    }
+
+    /// How often one of a sort came, and where it came first.
+    pub(super) fn of(&self, code: &str, message: &str) -> (u64, u64) {
+        let sort = self.sorts.iter().find(|sort| sort.0 == code && sort.1 == message);
+        sort.map_or((0, 0), |sort| (sort.2, sort.3))
     }
 
     /// What was counted; `finding` makes a diagnostic of code, message and byte.

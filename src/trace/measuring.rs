@@ -1,10 +1,11 @@
 //! XML of measuring functions and auto servo tuning, with its base-85 arrays -> rows.
 //!
-//! In: serialised objects: `<float name="...">` and `<NumericArray format="base85"><raw name="m_pNumberArray">`. Out: one signal an array, two
-//! of a complex one; numbers with names as metadata. From value to value it is `m_TimeVector.end` of the same object over the number of steps, else
-//! `m_dProcessUpdateTime`. Values beside an `m_FrequencyVector` of half their number are complex. Frequency responses have no time: their points are
-//! counted, and a note says so. Memory: all arrays, because they stand one behind the other and become columns: at most
-//! 20 million values (160 MB), an array of at most 64 MB of text.
+//! In: serialised objects: `<float name="...">` and `<NumericArray format="base85"><raw name="m_pNumberArray"><![CDATA[...]]>`; short arrays
+//! stand there as numbers with commas (`format="CSV"`). Out: one signal an array, two of a complex one; numbers with names as metadata, one
+//! that comes again under the names of the objects around it. From value to value it is `m_TimeVector.end` of the same object over the number
+//! of steps, else `m_dProcessUpdateTime`. Values beside an `m_FrequencyVector` of half their number are complex. Frequency responses, poles and
+//! zeros have no time: their points are counted, and a note says so. Memory: all arrays, because they stand one behind the other and become
+//! columns: at most 20 million values (160 MB), an array of at most 64 MB of text.
 
 use super::faults::TIME_MAX_S;
 use super::import::{About, ImportOptions};
@@ -23,6 +24,8 @@ const UPDATE_TIME: &str = "m_dProcessUpdateTime";
 const DEPTH_MAX: usize = 200;
 const ARRAYS_MAX: usize = 1000;
 const NUMBERS_MAX: usize = 10_000;
+/// Text of one array.
+const TEXT_BYTES_MAX: usize = 64 << 20;
 /// Values of all arrays.
 const VALUES_MAX: usize = 20_000_000;
 /// A shorter period is none.
@@ -72,8 +75,7 @@ pub(super) fn read_measuring(
         notes.push(Diagnostic::warning("T0012", message));
     }
     if walk.arrays.iter().any(|array| array.complex) {
-        let message =
-            "complex arrays are frequency responses: their points are counted, `time_s` means nothing for them";
+        let message = "complex arrays are frequency responses, poles or zeros: their points are counted, `time_s` means nothing for them";
         notes.push(Diagnostic::note("T0012", message));
     }
     hand_over(&walk.arrays, sink)?;
@@ -93,7 +95,7 @@ fn hand_over(arrays: &[Array], sink: &mut dyn Sink) -> Result<(), Diagnostic> {
         let parts: &[&str] = if array.complex { &[".re", ".im"] } else { &[""] };
         first_columns.push(heads.len());
         for part in parts {
-            let remark = if array.complex { "frequency response: its points are counted" } else { "" };
+            let remark = if array.complex { "no time series: its points are counted" } else { "" };
             heads.push(Head {
                 original: format!("{}{part}", array.name),
                 layout: Layout::Own,
@@ -156,6 +158,11 @@ struct Element {
     name: String,
     /// It says that its numbers are complex.
     complex: bool,
+    /// How it says that its numbers are written.
+    format: String,
+    /// What stands in it, as text or as CDATA, and where that begins.
+    text: String,
+    text_at: u64,
 }
 
 impl<'a> Walk<'a> {
@@ -195,7 +202,7 @@ impl<'a> Walk<'a> {
     /// Whether the file ends in good order.
     fn run(&mut self) -> Result<bool, Diagnostic> {
         // The text of an array is one item: megabytes are usual.
-        let mut reader = Reader::from_reader(self.source.read(self.part)?.with_item_limit(64 << 20));
+        let mut reader = Reader::from_reader(self.source.read(self.part)?.with_item_limit(TEXT_BYTES_MAX as u64));
         reader.config_mut().check_end_names = false;
         reader.config_mut().allow_unmatched_ends = true;
         let mut buffer = Vec::new();
@@ -206,9 +213,11 @@ impl<'a> Walk<'a> {
             match reader.read_event_into(&mut buffer) {
                 Ok(Event::Start(tag)) => self.open(&tag, at)?,
                 Ok(Event::End(_)) => {
+                    self.close()?;
                     self.path.pop();
                 }
                 Ok(Event::Text(text)) => self.text(&text.into_inner(), at)?,
+                Ok(Event::CData(text)) => self.text(&text.into_inner(), at)?,
                 Ok(Event::DocType(_)) => {
                     let message = "a trace has no document type, and entities are not expanded";
                     return Err(self.at(Diagnostic::error("T0006", message), at));
@@ -246,46 +255,101 @@ impl<'a> Walk<'a> {
         };
         let complex = attribute("elementtype").to_lowercase().contains("complex");
         self.elements += 1;
-        let (tag, name) = (tag.name().as_ref().to_owned(), attribute("name"));
-        self.path.push(Element { number: self.elements, tag, name, complex });
+        self.path.push(Element {
+            number: self.elements,
+            tag: tag.name().as_ref().to_owned(),
+            name: attribute("name"),
+            complex,
+            format: attribute("format"),
+            text: String::new(),
+            text_at: at,
+        });
         Ok(())
     }
 
+    /// Text may come in pieces: blanks around CDATA, several sections of it.
     fn text(&mut self, text: &str, at: u64) -> Result<(), Diagnostic> {
         let text = text.trim();
-        let Some(Element { tag, name, .. }) = self.path.last().filter(|_| !text.is_empty()) else { return Ok(()) };
-        // The object around a number; around the array around the raw text.
-        let around = |levels: usize| self.path.iter().rev().nth(levels).map_or(0, |element| element.number);
-        if tag != "raw" {
-            if name == TIME_END && self.ends_s.len() < NUMBERS_MAX {
-                let end_s = text.parse().ok().filter(|end_s: &f64| end_s.is_finite());
-                self.ends_s.extend(end_s.map(|end_s| (around(1), end_s)));
-            }
-            if !name.is_empty() && text.len() < 200 && self.numbers.len() < NUMBERS_MAX {
-                self.numbers.entry(name.clone()).or_insert_with(|| text.to_owned());
-            }
+        let Some(element) = self.path.last_mut().filter(|_| !text.is_empty()) else { return Ok(()) };
+        if element.text.is_empty() {
+            element.text_at = at;
+        }
+        if element.text.len() + text.len() > TEXT_BYTES_MAX {
+            let message = format!("the text of an array has more than {TEXT_BYTES_MAX} bytes");
+            return Err(self.at(Diagnostic::error("T0005", message), at));
+        }
+        element.text.push_str(text);
+        Ok(())
+    }
+
+    /// The innermost element ends: what stood in it is a number or an array.
+    fn close(&mut self) -> Result<(), Diagnostic> {
+        let Some(element) = self.path.last_mut() else { return Ok(()) };
+        let (text, at) = (std::mem::take(&mut element.text), element.text_at);
+        let (tag, name) = (element.tag.clone(), element.name.clone());
+        if text.is_empty() {
             return Ok(());
         }
-        let values = base85(text).ok_or_else(|| {
-            let message = "an array is not written in the base-85 digits of the control";
-            self.at(Diagnostic::error("T0004", message), at)
+        if tag == "raw" {
+            return self.array(&text, at);
+        }
+        if name == TIME_END && self.ends_s.len() < NUMBERS_MAX {
+            let (object, end_s) = (self.around(1), text.parse().ok().filter(|end_s: &f64| end_s.is_finite()));
+            self.ends_s.extend(end_s.map(|end_s| (object, end_s)));
+        }
+        if !name.is_empty() && text.len() < 200 && self.numbers.len() < NUMBERS_MAX {
+            let first = !self.numbers.contains_key(&name);
+            let key = if first { name } else { self.dotted() };
+            self.numbers.entry(key).or_insert(text);
+        }
+        Ok(())
+    }
+
+    /// Number of the object so many levels around the innermost element.
+    fn around(&self, levels: usize) -> usize {
+        self.path.iter().rev().nth(levels).map_or(0, |element| element.number)
+    }
+
+    /// Names of the open elements.
+    fn dotted(&self) -> String {
+        let names = self.path.iter().map(|element| element.name.as_str());
+        let names: Vec<&str> = names.filter(|name| !name.is_empty() && *name != "m_pNumberArray").collect();
+        if names.is_empty() { "array".to_owned() } else { names.join(".") }
+    }
+
+    fn array(&mut self, text: &str, at: u64) -> Result<(), Diagnostic> {
+        let format = self.path.iter().rev().map(|element| element.format.as_str()).find(|format| !format.is_empty());
+        let values = match format {
+            Some(format) if format.eq_ignore_ascii_case("csv") => commas(text),
+            _ => base85(text),
+        };
+        let values = values.ok_or_else(|| {
+            let format = format.unwrap_or("base85");
+            let message = format!("an array is not written as it says (`{format}`)");
+            let help = "known are the base-85 digits of the control (`base85`) and numbers with commas (`CSV`)";
+            self.at(Diagnostic::error("T0004", message).help(help), at)
         })?;
         self.values += values.len();
         if self.arrays.len() >= ARRAYS_MAX || self.values > VALUES_MAX {
             let message = format!("more than {ARRAYS_MAX} arrays or {VALUES_MAX} values");
             return Err(self.at(Diagnostic::error("T0017", message), at));
         }
-        let object = around(2);
-        let names = self.path.iter().map(|element| element.name.as_str());
-        let names: Vec<&str> = names.filter(|name| !name.is_empty() && *name != "m_pNumberArray").collect();
+        // The object around the array around the raw text.
+        let object = self.around(2);
         let complex = self.path.iter().any(|element| element.complex);
-        let mut name = if names.is_empty() { "array".to_owned() } else { names.join(".") };
+        let mut name = self.dotted();
         if self.arrays.iter().any(|array| array.name == name) {
             name = format!("{name} ({})", self.arrays.len() + 1);
         }
         self.arrays.push(Array { name, object, values, complex, period_s: USUAL_PERIOD_S });
         Ok(())
     }
+}
+
+/// Numbers with commas between them.
+fn commas(text: &str) -> Option<Vec<f64>> {
+    let filled = text.split(',').map(str::trim).filter(|word| !word.is_empty());
+    filled.map(|word| word.parse().ok()).collect()
 }
 
 /// Groups of five digits are words of four bytes, `.` is a word of zeros, two words are a big-endian double.

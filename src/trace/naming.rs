@@ -47,6 +47,8 @@ pub(super) struct NamedHead {
 pub(super) struct Naming<'a> {
     format: TraceFormat,
     options: &'a ImportOptions<'a>,
+    /// Names of axes by number as the file itself tells them: they come after what the user and the machine say.
+    pub(super) of_file: BTreeMap<u32, String>,
     /// Sort of the axes that nobody named, as their signals say.
     pub(super) guessed: BTreeMap<u32, AxisKind>,
     unnamed: BTreeSet<u32>,
@@ -59,6 +61,7 @@ impl<'a> Naming<'a> {
         Self {
             format,
             options,
+            of_file: BTreeMap::new(),
             guessed: BTreeMap::new(),
             unnamed: BTreeSet::new(),
             assumed_linear: BTreeSet::new(),
@@ -145,6 +148,10 @@ impl<'a> Naming<'a> {
             // Trivial kinematics: joint 0 is X and so on.
             return "XYZABCUVW".chars().nth(number as usize).map(String::from);
         }
+        self.of_machine(number).or_else(|| self.of_file.get(&number).cloned())
+    }
+
+    fn of_machine(&self, number: u32) -> Option<String> {
         let machine = self.options.machine?;
         let by_name = machine.axes.iter().find(|axis| {
             let digits =
@@ -185,8 +192,8 @@ impl<'a> Naming<'a> {
                 self.notes.push(Diagnostic::note("T0021", message).help("choose with --map CONTROLLER=OURS"));
             }
         }
-        for number in &self.unnamed {
-            let sort = match self.guessed.get(number) {
+        for number in std::mem::take(&mut self.unnamed) {
+            let sort = match self.guessed.get(&number) {
                 Some(AxisKind::Rotary) => "its speed and position say that it is rotary",
                 Some(AxisKind::Linear) => "its speed and position say that it is linear",
                 None => "it is taken as linear",
@@ -197,24 +204,25 @@ impl<'a> Naming<'a> {
                     .help(format!("name it with --axis-name {number}=X, or give the machine with -m")),
             );
         }
-        for name in &self.assumed_linear {
+        for name in std::mem::take(&mut self.assumed_linear) {
             let message = format!("axis `{name}` is taken as linear (mm): nothing says otherwise");
             self.notes.push(Diagnostic::note("T0012", message).help("give the machine with -m"));
         }
     }
 }
 
-/// X, Y, Z, U, V, W are linear, A, B, C rotary, with or without a number behind.
+/// X, Y, Z, U, V, W are linear, A, B, C and spindles (S, SP) rotary, with or without a number behind.
 fn kind_by_letter(name: &str) -> Option<AxisKind> {
     let mut characters = name.chars();
     let letter = characters.next()?.to_ascii_uppercase();
-    let rest = characters.as_str().trim_start_matches('_');
+    let rest = characters.as_str();
+    let rest = if letter == 'S' { rest.trim_start_matches(['P', 'p']) } else { rest }.trim_start_matches('_');
     if !rest.chars().all(|c| c.is_ascii_digit()) {
         return None;
     }
     match letter {
         'X' | 'Y' | 'Z' | 'U' | 'V' | 'W' => Some(AxisKind::Linear),
-        'A' | 'B' | 'C' => Some(AxisKind::Rotary),
+        'A' | 'B' | 'C' | 'S' => Some(AxisKind::Rotary),
         _ => None,
     }
 }
@@ -248,7 +256,8 @@ pub(super) fn operate_name(original: &str) -> Named {
     let bare = last
         .strip_prefix("nckServoData")
         .map_or(last, |rest| rest.strip_suffix("64").or_else(|| rest.strip_suffix("32")).unwrap_or(rest));
-    let number = index.rsplit(|c: char| !c.is_ascii_digit()).find(|digits| !digits.is_empty());
+    // `[u1, 7]`, in tables also `[u1; 7]` and `[u1  7]`.
+    let number = index.rsplit([',', ';', ' ']).find(|word| !word.is_empty());
     let of_axis = last.starts_with("nckServoData") || last.starts_with("measPos") || last.starts_with("aa");
     let axis = match number.and_then(|digits| digits.parse().ok()) {
         Some(number) if of_axis => AxisMark::Number(number),

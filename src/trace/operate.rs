@@ -3,7 +3,7 @@
 //! In: the text of a session, read as a stream; no entity is expanded. Out: heads and rows for a [`Sink`], notes about what was repaired.
 //! Attributes are found by name, records are sparse, frames follow one another with a gap between. Memory: one tag and one row.
 
-use super::faults::{Faults, TIME_MAX_S};
+use super::faults::{Faults, TIME_MAX_S, against_time};
 use super::import::{About, ImportOptions};
 use super::instants::instant_s;
 use super::naming::{NamedHead, Naming, operate_name};
@@ -22,6 +22,8 @@ const SERVO_EVENT: &str = "255";
 const SIGNALS_MAX: usize = 10_000;
 /// Rows that are looked at to know whether an axis is linear or rotary.
 const SURVEY_ROWS: usize = 200_000;
+/// What is said of a record that is left out.
+const EARLIER: &str = "a record is earlier than the one before and is left out";
 /// Times that differ by less are one instant: the file has microseconds.
 const SAME_INSTANT_S: f64 = 1e-9;
 
@@ -365,11 +367,16 @@ impl<'s, 'o> Session<'s, 'o> {
                 if first > 0 {
                     self.faults.count("T0009", "two records have one time and are joined", at);
                 }
+                // The first value of a signal counts; a million records of one instant must not pile up.
+                if self.pending.len() > 2 * self.heads.len() {
+                    self.pending.sort_by_key(|cell| cell.0);
+                    self.pending.dedup_by_key(|cell| cell.0);
+                }
                 return Ok(());
             }
             _ if time_s <= self.floor_s || self.pending_s.is_some_and(|pending_s| time_s < pending_s) => {
                 self.pending.truncate(first);
-                self.faults.count("T0009", "a record is earlier than the one before and is left out", at);
+                self.faults.count("T0009", EARLIER, at);
                 return Ok(());
             }
             _ => {}
@@ -427,6 +434,13 @@ impl<'s, 'o> Session<'s, 'o> {
         if self.rows == 0 {
             let message = format!("{} has no records", self.source.part_name(self.part));
             return Err(Diagnostic::error("T0003", message).help("was the trace started before it was exported?"));
+        }
+        let (earlier, at) = self.faults.of("T0009", EARLIER);
+        if let Some(finding) = against_time(earlier, self.rows, self.source.part_name(self.part)) {
+            return Err(match self.source.place(self.part, at, "the first one") {
+                Some(place) => finding.at(place),
+                None => finding,
+            });
         }
         let mut notes = std::mem::take(&mut self.naming.notes);
         if let Some(remark) = encoding {

@@ -10,11 +10,11 @@ use super::source::Progress;
 use super::wire::{Clock, Meaning, Origin, Signal, TimeGrid, Trace, TraceEvent, TraceFormat, Zero};
 use crate::base::units::NS_PER_S;
 use crate::base::{AXES_MAX, AxisKind, Diagnostic};
-use crate::recorder::schema::proto::sollwert::{Path as PathMessage, Sample};
+use crate::recorder::schema::proto::sollwert::{Path as PathMessage, Sample, Spindle};
 use crate::recorder::schema::{FLAGS_FIELD, MONITORING_FIELD, SIGNAL_TOPIC_PREFIX};
 use crate::recorder::{
-    ABOUT_METADATA, AXES_METADATA, AXIS_FIELDS, AxisSample, Content, Message, PATH_FIELDS, Recording, TopicKind,
-    UNITS_METADATA,
+    ABOUT_METADATA, AXES_METADATA, AXIS_FIELDS, AxisSample, Content, Message, PATH_FIELDS, Recording, SPINDLE_FIELDS,
+    TopicKind, UNITS_METADATA, spindle_values,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -41,6 +41,7 @@ pub fn import_recording(recording: &Recording, options: &ImportOptions) -> Resul
             (Content::Axis(sample), Some(track)) => track.push_axis(time_ns, &sample),
             (Content::Path(path), Some(track)) => track.push_path(time_ns, &path),
             (Content::Sample(sample), Some(track)) => track.push_sample(time_ns, &sample),
+            (Content::Spindle(spindle), Some(track)) => track.push_spindle(time_ns, &spindle),
             (Content::Programmed(message), _) if options.programmed => {
                 programmed.push(time_ns as f64 / NS_PER_S, &message);
             }
@@ -159,7 +160,7 @@ struct Track {
 
 /// One signal in the making.
 struct Column {
-    /// Place in `AXIS_FIELDS` or `PATH_FIELDS`.
+    /// Place in `AXIS_FIELDS`, `PATH_FIELDS` or `SPINDLE_FIELDS`.
     field: usize,
     name: String,
     unit: String,
@@ -200,9 +201,11 @@ impl Track {
             TopicKind::Axis { name, kind } => fields.iter().map(|field| Column::of_axis(name, *kind, *field)).collect(),
             TopicKind::Path => (0..PATH_FIELDS.len()).map(Column::of_path).collect(),
             TopicKind::Signal { original } => vec![Column::of_sample(original)],
+            TopicKind::Spindle => fields.iter().map(|field| Column::of_spindle(*field)).collect(),
             _ => return None,
         };
-        let clock = if *kind == TopicKind::Path { Clock::Interpolator } else { Clock::Servo };
+        let per_setpoint = matches!(kind, TopicKind::Path | TopicKind::Spindle);
+        let clock = if per_setpoint { Clock::Interpolator } else { Clock::Servo };
         let columns: Vec<Column> = columns.into_iter().filter(|column| options.wants(&column.name)).collect();
         (!columns.is_empty()).then_some(Self { clock, times_ns: Vec::new(), columns })
     }
@@ -229,6 +232,15 @@ impl Track {
             for column in &mut self.columns {
                 let value = sample_value(sample, &mut column.labels);
                 column.values.push(value);
+            }
+        }
+    }
+
+    fn push_spindle(&mut self, time_ns: u64, spindle: &Spindle) {
+        if self.push_time(time_ns) {
+            let values = spindle_values(spindle);
+            for column in &mut self.columns {
+                column.values.push(values.get(column.field).copied().flatten().unwrap_or(f64::NAN));
             }
         }
     }
@@ -286,6 +298,18 @@ impl Column {
         }
     }
 
+    fn of_spindle(field: usize) -> Self {
+        let name = SPINDLE_FIELDS[field];
+        Self {
+            field,
+            name: format!("{SPINDLE_PREFIX}{name}"),
+            unit: spindle_unit(name).to_owned(),
+            values: Vec::new(),
+            labels: Labels::default(),
+            discrete: false,
+        }
+    }
+
     fn push_path(&mut self, path: &PathMessage) {
         let value = path_value(path, self.field, &mut self.labels);
         self.values.push(value);
@@ -316,6 +340,14 @@ impl Column {
             meaning: Meaning::default(),
         }
     }
+}
+
+/// What our names of the signals of the spindle begin with.
+pub(super) const SPINDLE_PREFIX: &str = "spindle.";
+
+pub(super) fn spindle_unit(field: &str) -> &'static str {
+    let units = [("_deg", "deg"), ("_rpm", "rpm"), ("_rot_s2", "rot/s^2")];
+    units.iter().find(|(ending, _)| field.ends_with(ending)).map_or("", |(_, unit)| unit)
 }
 
 pub(super) fn path_unit(field: &str) -> &'static str {
@@ -369,6 +401,7 @@ pub(super) fn field_heads(kind: &TopicKind, fields: &[usize]) -> Vec<Head> {
             fields.iter().map(|field| Column::of_axis(name, *kind, *field).head()).collect()
         }
         TopicKind::Path => (0..PATH_FIELDS.len()).map(|field| Column::of_path(field).head()).collect(),
+        TopicKind::Spindle => fields.iter().map(|field| Column::of_spindle(*field).head()).collect(),
         TopicKind::Signal { original } => {
             vec![Head { layout: Layout::Own, name: None, ..Column::of_sample(original).head() }]
         }

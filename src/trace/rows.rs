@@ -8,7 +8,7 @@ use super::sink::{Head, Layout, Sink};
 use super::wire::{Clock, Trace};
 use crate::base::Diagnostic;
 use crate::base::units::NS_PER_S;
-use crate::recorder::{Content, Message, Recording, TopicKind};
+use crate::recorder::{Content, Message, Recording, TopicKind, spindle_values};
 
 /// Streams a recording: axes and path are held, one row an instant.
 pub(super) fn stream_recording(recording: &Recording, sink: &mut dyn Sink) -> Result<(), Diagnostic> {
@@ -41,6 +41,11 @@ pub(super) fn stream_recording(recording: &Recording, sink: &mut dyn Sink) -> Re
             (Content::Axis(sample), TopicKind::Axis { .. }) => {
                 let fields = recording.topics()[topic].fields.iter().enumerate();
                 cells.extend(fields.map(|(k, field)| (first + k, sample.get(*field).unwrap_or(f64::NAN))));
+            }
+            (Content::Spindle(spindle), _) => {
+                let (values, fields) = (spindle_values(spindle), recording.topics()[topic].fields.iter().enumerate());
+                let value = |field: usize| values.get(field).copied().flatten().unwrap_or(f64::NAN);
+                cells.extend(fields.map(|(k, field)| (first + k, value(*field))));
             }
             (Content::Sample(sample), _) => {
                 let known = labels[first].len();

@@ -1,7 +1,8 @@
 //! LinuxCNC halscope and halsampler -> rows.
 //!
-//! In: a text. Out: heads and rows for a [`Sink`]. halscope says its period; halsampler does not: `--time SECONDS` gives it, 1 ms is assumed
-//! else. Streams: memory holds one row.
+//! In: a text. Out: heads and rows for a [`Sink`]. halscope says its period, in the form of today (`# Sampling period is 1000000 ns`, a row of
+//! names, rows of values) and in that of LinuxCNC up to 2.8 (`Sampling period is 100000 nSec`, every value behind its name). halsampler does
+//! not: `--time SECONDS` gives it, 1 ms is assumed else. Streams: memory holds one row.
 
 use super::columns::named_head;
 use super::delimited::{cells, number};
@@ -71,17 +72,18 @@ pub(super) fn read_halscope(
     sink: &mut dyn Sink,
 ) -> Result<About, Diagnostic> {
     let mut lines = Lines::new(source, part)?;
-    let mut period_s = None;
-    let names = loop {
+    let (mut period_s, mut paired) = (None, false);
+    let names: Vec<String> = loop {
         if !lines.advance()? {
             return Err(lines.nothing());
         }
         let line = lines.line.trim();
-        if let Some(rest) = line.strip_prefix("# Sampling period is") {
+        if let Some(rest) = line.trim_start_matches(['#', ' ']).strip_prefix("Sampling period is") {
+            paired = !line.starts_with('#');
             let digits = rest.split_whitespace().next().and_then(|text| text.parse::<f64>().ok());
             period_s = digits.filter(|period| *period > 0.0).map(|period_ns| period_ns / NS_PER_S);
         } else if !line.is_empty() && !line.starts_with('#') {
-            break cells(line, ';');
+            break if paired { pairs(line).map(|(name, _)| name.to_owned()).collect() } else { cells(line, ';') };
         }
     };
     let Some(period_s) = period_s else {
@@ -95,15 +97,24 @@ pub(super) fn read_halscope(
     let mut faults = Faults::default();
     let mut rows = 0_u64;
     let mut row = Vec::new();
-    while lines.advance()? {
-        let line = lines.line.trim();
+    // Names and values of the older form stand in one line, so that the first one counts too.
+    let mut more = if paired { true } else { lines.advance()? };
+    while more {
+        let line = lines.line.trim().to_owned();
+        let at = lines.at;
+        more = lines.advance()?;
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
+        let texts = if paired { values_of(&line, &names) } else { Some(cells(&line, ';')) };
+        let Some(texts) = texts.filter(|texts| texts.len() <= names.len()) else {
+            faults.count("T0008", "a row has not the values that the first one has, and is left out", at);
+            continue;
+        };
         row.clear();
-        for (place, (text, named)) in cells(line, ';').iter().zip(&named).enumerate() {
+        for (place, (text, named)) in texts.iter().zip(&named).enumerate() {
             let value = number(text, true).unwrap_or_else(|| {
-                faults.count("T0010", "a value is no number: a gap", lines.at);
+                faults.count("T0010", "a value is no number: a gap", at);
                 f64::NAN
             });
             row.push((place, value * named.factor));
@@ -116,6 +127,18 @@ pub(super) fn read_halscope(
     }
     let notes = lines.notes(&faults, &mut naming);
     Ok(About { origin: origin(TraceFormat::Halscope), notes, ..About::default() })
+}
+
+/// Names and values of a line of the older form.
+fn pairs(line: &str) -> impl Iterator<Item = (&str, &str)> {
+    let mut words = line.split_whitespace();
+    std::iter::from_fn(move || Some((words.next()?, words.next()?)))
+}
+
+/// Values of a line that has the names it should have.
+fn values_of(line: &str, names: &[String]) -> Option<Vec<String>> {
+    let fits = pairs(line).map(|(name, _)| name).eq(names.iter().map(String::as_str));
+    fits.then(|| pairs(line).map(|(_, value)| value.to_owned()).collect())
 }
 
 /// Whole nanoseconds where the period is one.

@@ -27,7 +27,7 @@ pub(super) fn format_of(text: &str, shown: &str) -> Result<TraceFormat, Diagnost
             Err(unknown(shown, "JSON without `Header` and `Payload`"))
         };
     }
-    if start.starts_with("# Sampling period") {
+    if start.starts_with("# Sampling period") || start.starts_with("Sampling period is") {
         return Ok(TraceFormat::Halscope);
     }
     if twincat(start) {

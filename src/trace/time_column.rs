@@ -1,12 +1,13 @@
 //! When the rows of a table were taken.
 //!
 //! In: names, units and first rows; `--time NAME`, `--time NAME:SECONDS` or `--time SECONDS`. Out: [`TimeColumn`], which gives each row a
-//! time that is later than the one before, or passes the row over and counts it. Says how it was found.
+//! time that is later than the one before, or passes the row over and counts it; a column that is called time and runs backwards is refused
+//! instead of another one being taken. Says how it was found.
 
 use super::delimited::Dialect;
 use super::faults::{Faults, TIME_MAX_S};
 use super::import::ImportOptions;
-use super::instants::instant_s;
+use super::instants::{DAY_S, instant_s, without_date};
 use super::unit_words::{unit_and_factor, unit_in_name};
 use crate::base::Diagnostic;
 use crate::base::diagnostics::nearest;
@@ -26,8 +27,26 @@ const NAMES: [&str; 12] = [
     "sample",
     "n",
 ];
+/// Of these, names that mean nothing but the time: one that does not run forward is a fault of the table.
+const CERTAIN: [&str; 6] = ["time", "zeit", "timestamp", "zeitstempel", "timestamps", "datetime"];
 /// A counter of position cycles without a period: the usual one.
 const CYCLE_S: f64 = 0.002;
+
+/// What is said of a row that is left out.
+pub(super) const NOT_LATER: &str = "a row is not later than the one before and is left out";
+
+/// No time can be given to the rows.
+pub(super) struct Refused {
+    pub(super) finding: Diagnostic,
+    /// Where it is seen: a row of the sample.
+    pub(super) row: Option<usize>,
+}
+
+impl From<Diagnostic> for Refused {
+    fn from(finding: Diagnostic) -> Self {
+        Self { finding, row: None }
+    }
+}
 
 /// Gives times to rows.
 pub(super) struct TimeColumn {
@@ -37,6 +56,8 @@ pub(super) struct TimeColumn {
     dates: bool,
     start_s: Option<f64>,
     last_s: Option<f64>,
+    /// Days that have passed since the first row, of times without a date.
+    midnights_s: f64,
     row: u64,
     /// How it was found, for people.
     pub(super) description: String,
@@ -50,15 +71,14 @@ impl TimeColumn {
         dialect: &Dialect,
         options: &ImportOptions,
         shown: &str,
-    ) -> Result<Self, Diagnostic> {
+    ) -> Result<Self, Refused> {
         if let Some(period_s) = options.time_column.as_deref().and_then(|text| text.parse::<f64>().ok())
             && !names.iter().any(|name| Some(name.as_str()) == options.time_column.as_deref())
         {
             if !(period_s > 0.0 && period_s.is_finite()) {
                 let message = format!("`--time {period_s}` is no distance of two rows in s");
-                return Err(
-                    Diagnostic::error("T0019", message).help("write --time 0.002, or the name of the time column")
-                );
+                let help = "write --time 0.002, or the name of the time column";
+                return Err(Diagnostic::error("T0019", message).help(help).into());
             }
             let description = format!("rows every {period_s} s, as given with --time");
             return Ok(Self { cell: None, ..Self::new(None, period_s, false, description) });
@@ -66,6 +86,10 @@ impl TimeColumn {
         let (cell, given_s) = Self::choose(names, sample, dialect, options, shown)?;
         let name = &names[cell];
         let dates = sample.iter().filter_map(|row| row.get(cell)).any(|text| instant_s(text).is_some());
+        if dates && sample.iter().filter_map(|row| row.get(cell)).any(|text| without_date(text)) {
+            let description = format!("time column `{name}`, times of day");
+            return Ok(Self::new(Some(cell), 1.0, true, description));
+        }
         if dates {
             let description = format!("time column `{name}`, dates");
             return Ok(Self::new(Some(cell), 1.0, true, description));
@@ -87,7 +111,7 @@ impl TimeColumn {
     }
 
     fn new(cell: Option<usize>, scale_s: f64, dates: bool, description: String) -> Self {
-        Self { cell, scale_s, dates, start_s: None, last_s: None, row: 0, description }
+        Self { cell, scale_s, dates, start_s: None, last_s: None, midnights_s: 0.0, row: 0, description }
     }
 
     /// The column, and the seconds that one of its units is, if the user said so.
@@ -97,10 +121,13 @@ impl TimeColumn {
         dialect: &Dialect,
         options: &ImportOptions,
         shown: &str,
-    ) -> Result<(usize, Option<f64>), Diagnostic> {
+    ) -> Result<(usize, Option<f64>), Refused> {
         if let Some(asked) = &options.time_column {
             if let Some(cell) = names.iter().position(|name| name == asked) {
-                return Ok((cell, None));
+                return match Run::of(sample, cell, dialect) {
+                    Run::Backward(row) => Err(backwards(asked, row, shown)),
+                    _ => Ok((cell, None)),
+                };
             }
             if let Some((name, scale)) = asked.rsplit_once(':')
                 && let (Some(cell), Ok(scale_s)) = (names.iter().position(|known| known == name), scale.parse::<f64>())
@@ -112,18 +139,26 @@ impl TimeColumn {
             let near = nearest(asked, names.iter().map(String::as_str));
             let help =
                 near.map_or_else(|| format!("it has {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
-            return Err(Diagnostic::error("T0015", format!("{shown} has no column `{asked}`")).help(help));
+            return Err(Diagnostic::error("T0015", format!("{shown} has no column `{asked}`")).help(help).into());
         }
         let stems: Vec<String> = names.iter().map(|name| stem(name)).collect();
-        let increases = |cell: usize| increases(sample, cell, dialect);
+        let run = |cell: usize| Run::of(sample, cell, dialect);
+        let called = |known: &&str| (0..stems.len()).find(|cell| stems[*cell] == **known);
+        // Times with few digits repeat: what is called so must only not run backwards.
+        let forward = |cell: usize| matches!(run(cell), Run::Forward | Run::Repeats);
         let by_name =
-            NAMES.iter().find_map(|known| (0..stems.len()).find(|cell| stems[*cell] == *known && increases(*cell)));
-        let found = by_name.or_else(|| (0..names.len()).find(|cell| increases(*cell)));
+            NAMES.iter().find_map(|known| (0..stems.len()).find(|cell| stems[*cell] == *known && forward(*cell)));
+        if by_name.is_none()
+            && let Some((cell, Run::Backward(row))) = CERTAIN.iter().find_map(called).map(|cell| (cell, run(cell)))
+        {
+            return Err(backwards(&names[cell], row, shown));
+        }
+        let found = by_name.or_else(|| (0..names.len()).find(|cell| run(*cell) == Run::Forward));
         found.map(|cell| (cell, None)).ok_or_else(|| {
             let message =
                 format!("{shown} has no column that could be the time: none is called so, and none increases");
             let help = "name it with --time NAME, or give the distance of the rows in s with --time 0.002";
-            Diagnostic::error("T0015", message).help(help)
+            Diagnostic::error("T0015", message).help(help).into()
         })
     }
 
@@ -140,6 +175,14 @@ impl TimeColumn {
             return None;
         };
         if self.dates {
+            if without_date(text) {
+                // At midnight the day begins again.
+                time_s += self.midnights_s;
+                if self.last_s.zip(self.start_s).is_some_and(|(last, start)| last + start - time_s > DAY_S / 2.0) {
+                    self.midnights_s += DAY_S;
+                    time_s += DAY_S;
+                }
+            }
             let start_s = *self.start_s.get_or_insert(time_s);
             // Dates have microseconds; the difference of two large numbers has more digits than that.
             time_s = ((time_s - start_s) * 1e6).round() / 1e6;
@@ -156,7 +199,7 @@ impl TimeColumn {
             return None;
         }
         if self.last_s.is_some_and(|last_s| time_s <= last_s) {
-            faults.count("T0009", "a row is not later than the one before and is left out", at);
+            faults.count("T0009", NOT_LATER, at);
             return None;
         }
         self.last_s = Some(time_s);
@@ -186,17 +229,47 @@ fn stem(name: &str) -> String {
     bare.trim_end_matches(['[', '(', '_', ' ']).trim_start_matches('#').trim().to_lowercase()
 }
 
-/// Whether the numbers or dates of a column increase from row to row.
-fn increases(sample: &[Vec<String>], cell: usize, dialect: &Dialect) -> bool {
-    let read = |row: &Vec<String>| {
-        let text = row.get(cell)?;
-        instant_s(text).or_else(|| dialect.number(text).filter(|value| value.is_finite()))
-    };
-    let values: Vec<f64> = sample.iter().filter_map(read).collect();
-    // A step back here and there is a fault of the file, not of the choice.
-    let forward = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
-    !values.is_empty()
-        && values.len() * 10 >= sample.len() * 9
-        && forward * 10 >= (values.len() - 1) * 9
-        && (forward > 0 || values.len() == 1)
+/// How the numbers or dates of a column run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Run {
+    /// From row to row they increase, but for a step here and there, which is a fault of the file, not of the choice.
+    Forward,
+    /// They never decrease, but stay for some rows.
+    Repeats,
+    /// They do not increase; the row that is first not later than the one before, from 0.
+    Backward(usize),
+    /// They are no numbers.
+    Nothing,
+}
+
+impl Run {
+    fn of(sample: &[Vec<String>], cell: usize, dialect: &Dialect) -> Self {
+        let read = |(place, row): (usize, &Vec<String>)| {
+            let text = row.get(cell)?;
+            let value = instant_s(text).or_else(|| dialect.number(text).filter(|value| value.is_finite()))?;
+            Some((place, value))
+        };
+        let values: Vec<(usize, f64)> = sample.iter().enumerate().filter_map(read).collect();
+        if values.is_empty() || values.len() * 10 < sample.len() * 9 {
+            return Self::Nothing;
+        }
+        let steps = values.len() - 1;
+        let forward = values.windows(2).filter(|pair| pair[1].1 > pair[0].1).count();
+        let backward = values.windows(2).filter(|pair| pair[1].1 < pair[0].1).count();
+        let first = values.windows(2).find(|pair| pair[1].1 <= pair[0].1).map_or(0, |pair| pair[1].0);
+        match () {
+            () if steps == 0 || (forward > 0 && forward * 10 >= steps * 9) => Self::Forward,
+            () if backward == 0 && forward > 0 => Self::Repeats,
+            () => Self::Backward(first),
+        }
+    }
+}
+
+/// A column that is called time does not run forward. `row` counts from the first row of numbers.
+fn backwards(name: &str, row: usize, shown: &str) -> Refused {
+    let message = format!("the time column `{name}` of {shown} does not run forward");
+    let help = format!(
+        "sort the rows by `{name}`, name another column with --time NAME, or give the distance of the rows in s with --time 0.002"
+    );
+    Refused { finding: Diagnostic::error("T0009", message).help(help), row: Some(row) }
 }

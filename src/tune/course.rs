@@ -3,7 +3,7 @@
 //! In: a program (through the kernel, without drives, once), or a trace with set-points and a measured error. Out: [`Course`]. Exact stops do
 //! not wait for the axes here: the set-points depend on no gain. Of a long program the first [`COURSE_MAX_S`] count.
 
-use crate::base::units::rad_from_deg;
+use crate::base::units::{MS_PER_S, rad_from_deg};
 use crate::base::{AxisId, AxisKind, Diagnostic, MachinePoint, PerAxis};
 use crate::interpolator::{AxisSetpoint, FineInterpolator};
 use crate::interpreter::Setup;
@@ -102,10 +102,11 @@ pub fn course_of_program(
             tell(active.len() as f64 * period_s);
         }
     }
-    let findings = kernel.take_findings();
+    let mut findings = kernel.take_findings();
     if let Some(alarm) = findings.alarm {
         return Err(alarm);
     }
+    findings.warnings.extend(cut(name, active.len() as f64 * period_s >= COURSE_MAX_S));
     let axes = machine
         .axis_ids()
         .filter_map(|axis| {
@@ -135,6 +136,33 @@ pub fn course_of_program(
         axes,
         postures,
         active,
+    })
+}
+
+/// Set-points between samples are straight lines, and with them the feed-forward of the simulation steps.
+fn too_slow(machine: &Machine, axis: AxisId, signal: &Signal, name: &str) -> Option<Diagnostic> {
+    const SAME_RATE: f64 = 1.5;
+    let of_axis = machine.axis(axis);
+    let cycle_s = machine.cycle.time_base.seconds(of_axis.drive.as_ref()?.position_cycle_ticks);
+    let last = signal.len() - 1;
+    let sample_s = (signal.times.time_s(last) - signal.times.time_s(0)) / last as f64;
+    (sample_s > SAME_RATE * cycle_s).then(|| {
+        let [sample_ms, cycle_ms] = [sample_s, cycle_s].map(|time_s| time_s * MS_PER_S);
+        let message = format!(
+            "`{name}`: set-points of {} every {sample_ms:.3} ms, and its position cycle is {cycle_ms:.3} ms: between them they are straight lines",
+            of_axis.name
+        );
+        let help = "record in the position cycle; torque feed-forward tuned on this is uncertain beyond its interval";
+        Diagnostic::warning("U0006", message).help(help)
+    })
+}
+
+/// Says that the rest does not count.
+fn cut(name: &str, is_cut: bool) -> Option<Diagnostic> {
+    is_cut.then(|| {
+        let message = format!("`{name}`: its first {COURSE_MAX_S} s are used, the rest is not looked at");
+        Diagnostic::note("U0005", message)
+            .help("gains need accelerations and reversals of every axis: give the part that has them")
     })
 }
 
@@ -190,6 +218,8 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
         }
         axes.push(course);
     }
+    let mut warnings: Vec<Diagnostic> = cut(&trace.name, end_s - start_s > COURSE_MAX_S).into_iter().collect();
+    warnings.extend(found.iter().filter_map(|(axis, signal)| too_slow(machine, *axis, signal, &trace.name)));
     let rows = steps as usize + 1;
     let posture = |k: usize| {
         MachinePoint(PerAxis::from_fn(|axis| {
@@ -200,16 +230,7 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
     };
     let postures = (0..rows).map(posture).collect();
     let (name, active) = (trace.name.clone(), vec![true; rows]);
-    Ok(Course {
-        name,
-        validates,
-        measured: true,
-        duration_s: steps * period_s,
-        warnings: Vec::new(),
-        axes,
-        postures,
-        active,
-    })
+    Ok(Course { name, validates, measured: true, duration_s: steps * period_s, warnings, axes, postures, active })
 }
 
 fn resampled(signal: &Signal, times: &[f64], kind: AxisKind, name: &str) -> Result<Vec<f64>, Diagnostic> {

@@ -33,7 +33,8 @@ pub(super) struct Certainty {
 struct Block {
     square: Vec<f64>,
     slope: Vec<f64>,
-    error: f64,
+    /// Of each component.
+    errors: Vec<f64>,
 }
 
 /// Normal equations, block by block, each course with the same weight.
@@ -54,7 +55,11 @@ impl Normal {
             let length = ((BLOCK_S / base.period_s) as usize).max(1) * base.components;
             for start in (0..base.of.len()).step_by(length) {
                 let range = start..(start + length).min(base.of.len());
-                let mut block = Block { square: vec![0.0; count * count], slope: vec![0.0; count], error: 0.0 };
+                let mut block = Block {
+                    square: vec![0.0; count * count],
+                    slope: vec![0.0; count],
+                    errors: vec![0.0; base.components],
+                };
                 let mut derivatives = vec![0.0; count];
                 for at in range {
                     let error = base.of[at];
@@ -67,7 +72,7 @@ impl Normal {
                             block.square[i * count + j] += weight * derivatives[i] * derivatives[j];
                         }
                     }
-                    block.error += weight * error * error;
+                    block.errors[at % base.components] += weight * error * error;
                 }
                 for i in 0..count {
                     for j in 0..i {
@@ -90,8 +95,13 @@ impl Normal {
         (square, slope)
     }
 
-    fn error(&self) -> f64 {
-        self.blocks.iter().map(|block| block.error).sum()
+    /// Of one component, or of all.
+    fn error(&self, component: Option<usize>) -> f64 {
+        let of_block = |block: &Block| match component {
+            Some(component) => block.errors.get(component).copied().unwrap_or(0.0),
+            None => block.errors.iter().sum(),
+        };
+        self.blocks.iter().map(of_block).sum()
     }
 }
 
@@ -165,14 +175,15 @@ fn normal(group: &Group<'_>, gains: &[Gains]) -> Normal {
 }
 
 fn step_from<'n>(group: &Group<'_>, normal: &'n Normal, gains: &[Gains], theory: &[Gains]) -> Step<'n> {
-    let scatter = normal.error() / normal.blocks.len().max(1) as f64;
+    // Of the axis itself: a rotary axis has other numbers than a linear one of its group.
+    let scatter = |slot: &super::group::Slot| normal.error(group.component(slot)) / normal.blocks.len().max(1) as f64;
     let width = |slot: &super::group::Slot| {
         let steps = if slot.gain == Gain::Torque { 2.0 * PREFERENCE_STEPS } else { PREFERENCE_STEPS };
         (steps * slot.gain.step(slot.range)).max(f64::MIN_POSITIVE)
     };
     Step {
         normal,
-        weights: group.slots.iter().map(|slot| scatter / (width(slot) * width(slot))).collect(),
+        weights: group.slots.iter().map(|slot| scatter(slot) / (width(slot) * width(slot))).collect(),
         away: group.slots.iter().map(|slot| group.value(gains, slot) - group.value(theory, slot)).collect(),
         room: group
             .slots
@@ -238,6 +249,7 @@ pub(super) fn certainty(group: &Group<'_>, gains: &[Gains], theory: &[Gains]) ->
             values.push(part);
         }
     }
+    let widening = widening(blocks);
     let certainty = |(place, slot): (usize, &super::group::Slot)| {
         let values = &mut found[place].clone();
         values.sort_by(f64::total_cmp);
@@ -245,11 +257,21 @@ pub(super) fn certainty(group: &Group<'_>, gains: &[Gains], theory: &[Gains]) ->
         let value = group.value(gains, slot);
         // Around the value that is written: what the last linear step says beside it is rounding and stick events.
         let (low, high) = (value + at(0.025) - centre[place], value + at(0.975) - centre[place]);
+        let wider = |end: f64| value + widening * (end - value);
         let own = all_square[place * normal.count + place];
         let certain = own > step.weights[place] && high - low < TELLING_SHARE * (slot.range[1] - slot.range[0]);
-        Certainty { low: low.min(value), high: high.max(value), certain }
+        Certainty { low: wider(low.min(value)), high: wider(high.max(value)), certain }
     };
     group.slots.iter().enumerate().map(certainty).collect()
+}
+
+/// A bootstrap of few blocks is too narrow: Student's quantile [Abramowitz 1964, 26.7.5] over that of the normal distribution, and the scatter
+/// with n - 1.
+fn widening(blocks: usize) -> f64 {
+    const NORMAL: f64 = 1.959_964;
+    let freedom = blocks.max(2) as f64 - 1.0;
+    let student = NORMAL + (2.372_3 + 2.822_5 / freedom) / freedom;
+    student / NORMAL * ((freedom + 1.0) / freedom).sqrt()
 }
 
 /// xorshift64*, below a count.

@@ -18,11 +18,13 @@ pub enum Gain {
     Delay,
     /// Amplitude of the pulse at a reversal.
     Friction,
+    /// Time in which that pulse fades.
+    FrictionTime,
 }
 
 impl Gain {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Velocity, Self::Torque, Self::Delay, Self::Friction];
+    pub const ALL: [Self; 5] = [Self::Velocity, Self::Torque, Self::Delay, Self::Friction, Self::FrictionTime];
 
     /// On the command line.
     pub fn word(self) -> &'static str {
@@ -31,6 +33,7 @@ impl Gain {
             Self::Torque => "torque",
             Self::Delay => "delay",
             Self::Friction => "friction",
+            Self::FrictionTime => "friction-time",
         }
     }
 
@@ -42,6 +45,7 @@ impl Gain {
             (Self::Delay, _) => "setpoint_delay_ms",
             (Self::Friction, AxisKind::Linear) => "friction_compensation_mm_s",
             (Self::Friction, AxisKind::Rotary) => "friction_compensation_deg_s",
+            (Self::FrictionTime, _) => "friction_compensation_time_ms",
         }
     }
 
@@ -49,7 +53,7 @@ impl Gain {
     pub fn unit(self, kind: AxisKind) -> &'static str {
         match (self, kind) {
             (Self::Velocity | Self::Torque, _) => "",
-            (Self::Delay, _) => "ms",
+            (Self::Delay | Self::FrictionTime, _) => "ms",
             (Self::Friction, AxisKind::Linear) => "mm/s",
             (Self::Friction, AxisKind::Rotary) => "deg/s",
         }
@@ -59,7 +63,7 @@ impl Gain {
     pub(super) fn shown(self, kind: AxisKind, inside: f64) -> f64 {
         match (self, kind) {
             (Self::Velocity | Self::Torque, _) | (Self::Friction, AxisKind::Linear) => inside,
-            (Self::Delay, _) => inside * MS_PER_S,
+            (Self::Delay | Self::FrictionTime, _) => inside * MS_PER_S,
             (Self::Friction, AxisKind::Rotary) => deg_from_rad(inside),
         }
     }
@@ -71,9 +75,13 @@ impl Gain {
 
     /// Digits behind the point that are worth writing.
     pub(super) fn rounded(self, kind: AxisKind, inside: f64) -> f64 {
-        // 1e-4 of a weight, 1 µs.
-        let steps = if self == Self::Delay { 1e3 } else { 1e4 };
+        let steps = self.written_steps();
         self.inside(kind, (self.shown(kind, inside) * steps).round() / steps)
+    }
+
+    /// Steps of a written value in one unit of its key: 1e-4 of a weight, 1 µs.
+    pub(super) fn written_steps(self) -> f64 {
+        if matches!(self, Self::Delay | Self::FrictionTime) { 1e3 } else { 1e4 }
     }
 
     /// First step of a search; the width of the preference for theory is three of them, of the torque six.
@@ -83,13 +91,14 @@ impl Gain {
             Self::Torque => 0.05,
             Self::Delay => 0.2 / MS_PER_S,
             Self::Friction => 0.1 * (range[1] - range[0]),
+            Self::FrictionTime => 2.0 / MS_PER_S,
         }
     }
 }
 
 /// One value for each gain.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Gains([f64; 4]);
+pub(super) struct Gains([f64; 5]);
 
 impl Gains {
     pub fn of(data: &DriveData) -> Self {
@@ -98,6 +107,7 @@ impl Gains {
             data.torque_feedforward_ratio,
             data.setpoint_delay_s,
             data.options.friction_pulse_lu_s,
+            data.options.friction_pulse_time_s,
         ])
     }
 
@@ -113,11 +123,12 @@ impl Gains {
     /// Drive data with these gains.
     pub fn applied(&self, data: &DriveData) -> DriveData {
         let mut data = data.clone();
-        let [velocity, torque, delay_s, pulse_lu_s] = self.0;
+        let [velocity, torque, delay_s, pulse_lu_s, pulse_time_s] = self.0;
         data.velocity_feedforward_ratio = velocity;
         data.torque_feedforward_ratio = torque;
         data.setpoint_delay_s = delay_s;
         data.options.friction_pulse_lu_s = pulse_lu_s;
+        data.options.friction_pulse_time_s = pulse_time_s;
         data
     }
 
@@ -137,7 +148,7 @@ impl Gains {
                 }
                 Gain::Torque => continue,
                 Gain::Delay => delay_s,
-                Gain::Friction => continue,
+                Gain::Friction | Gain::FrictionTime => continue,
             };
             gains = gains.with(*gain, value);
         }
@@ -154,6 +165,7 @@ pub(super) fn range(options: &TuneOptions, gain: Gain, axis: &Axis, data: &Drive
         Gain::Velocity => [0.5, 1.5],
         Gain::Torque => [0.0, 2.0],
         Gain::Delay => [0.0, 4.0 / MS_PER_S],
+        Gain::FrictionTime => [1.0 / MS_PER_S, 50.0 / MS_PER_S],
         // The speed that the speed controller lacks while it integrates from -Tc to Tc, twice over.
         Gain::Friction => {
             let mechanics = &data.mechanics;

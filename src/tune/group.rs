@@ -1,11 +1,12 @@
 //! Axes that are tuned together, and the whole of a tuning.
 //!
-//! In: machine, courses, options. Out: [`Tuned`]. Under the contour objective the axes that move the tool in one course are one group with one
-//! delay; else every axis is its own group. New gains are taken only if they are better on the courses for tuning by more than chance: a paired
+//! In: machine, courses, options. Out: [`Tuned`]. The axes that move the tool are one group with one delay, whatever the objective: delays of
+//! their own would bend every path between them. Every other axis is its own group. An angle of a rotary axis in the group counts with
+//! [`LEVER_MM`]. New gains are taken only if they are better on the courses for tuning by more than chance: a paired
 //! look at blocks of [`BLOCK_S`] decides, and 2 % (contour: 10 %) are the least, so that tuning does not chase single friction events.
 
 use super::contour::{Tool, moves_tool};
-use super::course::Course;
+use super::course::{AxisCourse, Course};
 use super::figures::{CourseFigures, Sensitivity, course_figures, sensitivities};
 use super::fit::{Certainty, certainty, gauss_newton};
 use super::gains::{Gain, Gains, range};
@@ -24,6 +25,8 @@ const CERTAIN_ERRORS: f64 = 1.65;
 /// reversals: an improvement there of less than a tenth has made other programs worse.
 const WORTH_RATIO: f64 = 0.98;
 const WORTH_CONTOUR_RATIO: f64 = 0.9;
+/// What an angle moves: the radius of a part, so that mm and rad can stand in one sum.
+const LEVER_MM: f64 = 100.0;
 
 /// What came of it.
 #[derive(Clone, Debug)]
@@ -226,12 +229,41 @@ impl Group<'_> {
             let of = self.tool.errors_mm(course, &self.paths_mm[number], &lags);
             return Residual { of, components: 3, period_s: setpoint_s };
         }
-        let one = found.map(|(of_axis, response)| {
-            let of =
-                if self.objective == Objective::Following { &response.following_lu } else { &response.deviation_lu };
-            Residual { of: of.clone(), components: 1, period_s: setpoint_s / of_axis.steps as f64 }
-        });
-        one.last().unwrap_or(Residual { of: Vec::new(), components: 1, period_s: setpoint_s })
+        let found: Vec<(&AxisCourse, &[f64])> = found
+            .map(|(of_axis, response)| match self.objective {
+                Objective::Following => (of_axis, response.following_lu.as_slice()),
+                _ => (of_axis, response.deviation_lu.as_slice()),
+            })
+            .collect();
+        let (of, steps) = self.rows(&found);
+        Residual { of, components: self.members.len(), period_s: setpoint_s / steps as f64 }
+    }
+
+    /// Errors of all members, a number of each in a row, at the position cycle of the slowest; 0 where a trace lacks an axis. And the rows in t_s.
+    fn rows(&self, found: &[(&AxisCourse, &[f64])]) -> (Vec<f64>, usize) {
+        let steps = found.iter().map(|(of_axis, _)| of_axis.steps).min().unwrap_or(1).max(1);
+        let rows = found.iter().map(|(of_axis, of)| of.len() * steps / of_axis.steps.max(1)).min().unwrap_or(0);
+        let count = self.members.len();
+        let mut all = vec![0.0; rows * count];
+        for (of_axis, of) in found {
+            let Some(member) = self.members.iter().position(|member| member.axis == of_axis.axis) else { continue };
+            let rotary = self.machine.axis(of_axis.axis).kind == AxisKind::Rotary;
+            let weight = if rotary && count > 1 { LEVER_MM } else { 1.0 };
+            for (row, error_lu) in of.iter().step_by(of_axis.steps / steps).take(rows).enumerate() {
+                if let Some(place) = all.get_mut(row * count + member) {
+                    *place = weight * error_lu;
+                }
+            }
+        }
+        (all, steps)
+    }
+
+    /// The component of a residual that belongs to a slot alone, if there is one.
+    pub fn component(&self, slot: &Slot) -> Option<usize> {
+        match slot.members.as_slice() {
+            [only] if self.objective != Objective::Contour => Some(*only),
+            _ => None,
+        }
     }
 
     /// Scores of candidates.
@@ -287,7 +319,7 @@ impl Group<'_> {
     }
 
     /// New gains, and how certain they are.
-    fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, bool) {
+    fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, Option<&'static str>) {
         let before = self.before();
         let theory = self.theory();
         let ends: Vec<(Vec<Gains>, Score)> =
@@ -301,8 +333,16 @@ impl Group<'_> {
                 .iter()
                 .zip(&self.slots)
                 .any(|(certainty, slot)| slot.gain == Gain::Delay && !certainty.certain);
-        let kept = untold || !self.better(&before, &found);
-        let gains = if kept { before } else { found };
+        let kept = if found == before {
+            Some("the best gains found are those of the machine")
+        } else if untold {
+            Some("the paths do not tell the common delay, and without it the other gains say nothing: kept")
+        } else if !self.better(&before, &found) {
+            Some("no gains are better than those of the machine by more than chance, and by enough to last: kept")
+        } else {
+            None
+        };
+        let gains = if kept.is_some() { before } else { found };
         let certainty = certainty(self, &gains, &theory);
         (gains, certainty, kept)
     }
@@ -347,12 +387,8 @@ pub fn tune(
         };
         let group = group(machine, &courses[..training], &tool, &paths_mm, members, own_objective, options);
         let (gains, certainty, kept) = group.tuned();
-        if kept {
-            let message = format!(
-                "{}: no gains are better than those of the machine by more than chance, and by enough to last, or the courses do not tell the delay: kept",
-                names.join(", ")
-            );
-            warnings.push(Diagnostic::note("U0003", message));
+        if let Some(why) = kept {
+            warnings.push(Diagnostic::note("U0003", format!("{}: {why}", names.join(", "))));
         }
         axes.extend(tuned_axes(&group, &gains, &certainty));
         after.extend(members.iter().copied().zip(gains.iter().copied()));
@@ -393,8 +429,7 @@ fn groups(machine: &Machine, training: &[Course], options: &TuneOptions) -> Resu
         return Err(Diagnostic::error("U0002", message)
             .help("name a program that moves axes with [axes.*.drive]; --axis names them"));
     }
-    let (together, alone): (Vec<AxisId>, Vec<AxisId>) =
-        moving.into_iter().partition(|axis| options.objective == Objective::Contour && moves_tool(machine, *axis));
+    let (together, alone): (Vec<AxisId>, Vec<AxisId>) = moving.into_iter().partition(|axis| moves_tool(machine, *axis));
     let mut groups: Vec<Vec<AxisId>> = if together.is_empty() { Vec::new() } else { vec![together] };
     groups.extend(alone.into_iter().map(|axis| vec![axis]));
     Ok(groups)
@@ -414,7 +449,13 @@ fn group<'a>(
         .filter_map(|id| {
             let axis = machine.axis(*id);
             let data = axis.drive.clone()?;
-            let idle = |gain: &Gain| *gain == Gain::Torque && data.feedforward_inertia_kg_m2 == 0.0;
+            let pulses = options.gains.contains(&Gain::Friction) || data.options.friction_pulse_lu_s > 0.0;
+            let idle = |gain: &Gain| match gain {
+                Gain::Torque => data.feedforward_inertia_kg_m2 == 0.0,
+                // A pulse of 0 has no time.
+                Gain::FrictionTime => !pulses,
+                _ => false,
+            };
             let free = Gain::ALL.into_iter().filter(|gain| options.gains.contains(gain) && !idle(gain));
             // Without friction there is nothing to compensate.
             let ranges = free
@@ -427,7 +468,7 @@ fn group<'a>(
     let mut slots: Vec<Slot> = Vec::new();
     for (place, member) in members.iter().enumerate() {
         for (gain, range) in &member.ranges {
-            let shared = *gain == Gain::Delay && objective == Objective::Contour;
+            let shared = *gain == Gain::Delay;
             match slots.iter_mut().find(|slot| shared && slot.gain == Gain::Delay) {
                 Some(slot) => slot.members.push(place),
                 None => slots.push(Slot { gain: *gain, members: vec![place], range: *range }),
@@ -456,8 +497,9 @@ fn tuned_axes(group: &Group<'_>, gains: &[Gains], certainty: &[Certainty]) -> Ve
                 gain: slot.gain,
                 before: shown(before[place].get(slot.gain)),
                 value: shown(inside),
-                low: shown(certainty.low),
-                high: shown(certainty.high),
+                // A value is rounded before it is written.
+                low: shown(certainty.low) - 0.5 / slot.gain.written_steps(),
+                high: shown(certainty.high) + 0.5 / slot.gain.written_steps(),
                 at_bound: inside <= slot.range[0] + margin || inside >= slot.range[1] - margin,
                 certain: certainty.certain,
             });

@@ -57,7 +57,7 @@ fn map(group: &Group<'_>, gains: &[Gains], slots: [&Slot; 2], kind: AxisKind) ->
             candidates.push(moved);
         }
     }
-    let angle = kind == AxisKind::Rotary && group.objective != Objective::Contour;
+    let angle = kind == AxisKind::Rotary && group.objective != Objective::Contour && group.members.len() == 1;
     // Row by row: the residuals of a whole map at once would take much room.
     let heights: Vec<Vec<f64>> = candidates
         .chunks(POINTS)

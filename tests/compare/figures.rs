@@ -20,6 +20,29 @@ fn figures_of_a_ramp_are_those_of_the_ramp() {
     assert_eq!(Gathering::default().finish(), None);
 }
 
+/// The moves of `steps` begin at 1.0 s and end at 7.2 s; a rest before and behind does not count, of a rotary axis as of a linear one.
+#[test]
+fn a_cycle_lasts_from_the_first_to_the_last_motion_of_any_axis() {
+    let times = grid(0.001, 9000);
+    let own = |name: &str, delay_s: f64| {
+        trace(vec![
+            signal("X.position_setpoint_mm", "mm", &times, |_| 12.0),
+            signal(name, "deg", &times, |t| 30.0 + steps(t - delay_s)),
+        ])
+    };
+    let (a, b) = (own("C.position_setpoint_deg", 0.0), own("C.position_setpoint_deg", 1.3));
+    let comparison = compare(&a, &b, &CompareOptions::default()).expect("figures");
+    for side in &comparison.sides {
+        // A smooth step of 12 deg in 0.4 s is above a ten-thousandth after 4 ms.
+        assert!((side.cycle_time_s.expect("a motion") - 6.2).abs() < 0.02, "{:?}", side.cycle_time_s);
+        assert_eq!(side.cycle_time_basis, "first to last motion");
+    }
+    let still = own("C.torque_reference_n_m", 0.0);
+    let side = sollwert::compare::examine(&still, None).expect("a plane");
+    assert!(side.cycle_time_basis.starts_with("length of the trace"), "{}", side.cycle_time_basis);
+    assert_eq!(side.cycle_time_s, Some(8.999));
+}
+
 #[test]
 fn a_lag_is_a_difference_of_speed_times_delay_and_a_delay() {
     let times = grid(0.001, 9000);

@@ -2,6 +2,7 @@
 
 use crate::rig::{Random, Rig, input, mvc_x, mvc_y, ucp_a};
 use sollwert::drive::{AxisDrive, AxisSignals, DriveBatch, DriveInput};
+use sollwert::machine::JerkFilterKind;
 
 /// Sixty-four parameter sets around the two Spinner axes, friction and limits included, and others that go alone.
 fn rigs(random: &mut Random) -> Vec<Rig> {
@@ -74,6 +75,120 @@ fn a_batch_is_every_drive_alone() {
     }
 }
 
+/// Rows that do not depend on who computes them: sines, rest, jumps and loads of their own for each drive.
+fn inputs(rigs: &[Rig], k: u32) -> Vec<DriveInput> {
+    (0..rigs.len())
+        .map(|n| {
+            let (t_s, phase) = (f64::from(k) * 1e-3, n as f64);
+            let x = if k < 40 { 0.0 } else { 2.0 * (11.0 * t_s + phase).sin() - 2.0 * (0.44 + phase).sin() };
+            let jump = if (200..260).contains(&k) { 3.0 } else { 0.0 };
+            DriveInput {
+                position_setpoint_lu: 0.2 + x + jump,
+                load_n_m: if k > 300 { 0.3 } else { 0.0 },
+                feedforward_active: k % 97 < 80,
+            }
+        })
+        .collect()
+}
+
+/// What the processor can do must not be seen in a result: the instructions that every processor has give the same bits as the widest ones of
+/// the one that the test runs on (a processor without AVX2 compares the former with itself; the single drive is compiled for every processor, too).
+#[test]
+fn every_processor_gives_the_same_bits() {
+    let mut random = Random(2);
+    let rigs = rigs(&mut random);
+    let mut single: Vec<AxisDrive> = rigs.iter().map(|rig| rig.drive(0.2)).collect();
+    let mut fast = DriveBatch::new(single.clone());
+    let mut plain = DriveBatch::new(single.clone()).on_any_processor();
+    for k in 0..400 {
+        let inputs = inputs(&rigs, k);
+        let mut signals = [(); 2].map(|()| vec![AxisSignals::default(); rigs.len()]);
+        fast.step(&inputs, |place, now| signals[0][place] = *now);
+        plain.step(&inputs, |place, now| signals[1][place] = *now);
+        let bits = |signals: &AxisSignals| format!("{signals:?}");
+        for (n, drive) in single.iter_mut().enumerate() {
+            let alone = bits(&drive.step(inputs[n]));
+            assert_eq!(alone, bits(&signals[0][n]), "drive {n}, cycle {k}");
+            assert_eq!(alone, bits(&signals[1][n]), "drive {n}, cycle {k}, any processor");
+        }
+    }
+}
+
+/// The drives may be asked for at any time, and may then go alone: nothing of them is left in the batch, and nothing is lost on the way there and back.
+#[test]
+fn drives_come_and_go() {
+    let mut random = Random(5);
+    let mut rigs = rigs(&mut random);
+    for (n, rig) in rigs.iter_mut().enumerate() {
+        // Memories of many shapes in front of the position loop.
+        rig.data.options.friction_pulse_lu_s = if n % 3 == 0 { 2.0 } else { 0.0 };
+        rig.data.feedforward_delay_s = if n % 4 == 0 { 2.3e-3 } else { 0.0 };
+        rig.data.encoder.position_resolution_lu = if n % 5 == 0 { 1e-4 } else { 0.0 };
+        rig.data.options.backlash_compensation_lu = if n % 6 == 0 { 1e-3 } else { 0.0 };
+        if n % 7 == 0 {
+            let filter = &mut rig.data.options.jerk_filter;
+            (filter.kind, filter.time_s) = (JerkFilterKind::MovingAverage, 5e-3);
+        }
+    }
+    let mut single: Vec<AxisDrive> = rigs.iter().map(|rig| rig.drive(0.2)).collect();
+    let mut batch = DriveBatch::new(single.clone());
+    assert_eq!(batch.together(), 64, "none of these keeps an axis from going together");
+    for k in 0..400_u32 {
+        let inputs = inputs(&rigs, k);
+        let mut together = vec![AxisSignals::default(); rigs.len()];
+        match k % 10 {
+            // One of them waits, so that its block goes one by one.
+            3 => {
+                let waits = k as usize % rigs.len();
+                batch.step_some(|place| (place != waits).then(|| inputs[place]), |place, now| together[place] = *now);
+                together[waits] = batch.drives_mut()[waits].step(inputs[waits]);
+            }
+            7 => {
+                for (n, drive) in batch.drives_mut().iter_mut().enumerate() {
+                    together[n] = drive.step(inputs[n]);
+                }
+            }
+            8 => {
+                batch = batch.clone();
+                batch.step(&inputs, |place, now| together[place] = *now);
+            }
+            _ => batch.step(&inputs, |place, now| together[place] = *now),
+        }
+        for (n, drive) in single.iter_mut().enumerate() {
+            assert_eq!(together[n], drive.step(inputs[n]), "drive {n}, cycle {k}");
+        }
+        if k == 250 {
+            for drives in [&mut single[..], batch.drives_mut()] {
+                drives[12].brake(30.0, 0.02);
+                drives[13].brake(-30.0, 0.02);
+            }
+        }
+    }
+}
+
+/// A drive that diverges is seen where it is, and only there.
+#[test]
+fn divergence_is_seen_in_a_batch() {
+    let drives: Vec<AxisDrive> = (0..10).map(|_| mvc_x().drive(0.0)).collect();
+    let mut batch = DriveBatch::new(drives);
+    let mut inputs = vec![input(0.0); 10];
+    batch.step(&inputs, |_, _| {});
+    assert!((0..11).all(|place| batch.is_finite(place)));
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut batch = batch.clone();
+        inputs[6] = input(bad);
+        for _ in 0..3 {
+            batch.step(&inputs, |_, _| {});
+        }
+        for place in 0..10 {
+            assert_eq!(batch.is_finite(place), place != 6, "{bad}, place {place}");
+        }
+        let finite: Vec<bool> = batch.into_drives().iter().map(AxisDrive::is_finite).collect();
+        assert_eq!(finite.iter().filter(|finite| !**finite).count(), 1);
+        assert!(!finite[6]);
+    }
+}
+
 /// Fewer inputs than drives: those without one wait.
 #[test]
 fn drives_without_an_input_wait() {
@@ -87,6 +202,6 @@ fn drives_without_an_input_wait() {
     assert_eq!(shown, 5);
     let mut alone = drives[0].clone();
     alone.step(input(1.0));
-    assert_eq!(batch.drives()[4].state(), alone.state());
-    assert_eq!(batch.drives()[5].state(), drives[5].state());
+    assert_eq!(batch.drives_mut()[4].state(), alone.state());
+    assert_eq!(batch.drives_mut()[5].state(), drives[5].state());
 }

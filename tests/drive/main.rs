@@ -7,6 +7,7 @@ mod friction;
 mod limits;
 mod linear;
 mod monitoring;
+mod odd;
 mod options;
 mod plant;
 mod reference;

@@ -10,6 +10,7 @@ mod printed_loop;
 mod profile;
 mod programmed_time;
 mod published;
+mod revolutions;
 mod sampled;
 mod spindle;
 mod support;

@@ -14,6 +14,7 @@ fn machine(time_law: TimeLawKind) -> Machine {
     machine.spindle = Some(SpindleSettings {
         acceleration_rad_s2: 30.0 * TAU,
         tolerance_share: 0.1,
+        starts_at_once: false,
         waits_for_stop: false,
         positioning_speed_rad_s: 5.0 * TAU,
         positioning_acceleration_rad_s2: 30.0 * TAU,

@@ -347,3 +347,91 @@ fn the_actual_spindle_lags_by_its_delay() {
         assert!((behind - lag * actual).abs() < 1e-9, "{t}");
     }
 }
+
+#[test]
+fn dits_and_dite_are_the_ways_of_run_in_and_run_out() {
+    for machine in laws() {
+        for mode in ["SOFT", "BRISK"] {
+            let text = format!(
+                "{mode} M3 S300\nDITS=4 DITE=2\nG33 Z-20 K1.5 SF=0\nG0 X1\nDITS=-1 DITE=-1\nG33 Z-40 K1.5\nM30\n"
+            );
+            let (rows, said) = replay(&machine, &text, false);
+            assert_eq!(said, Vec::<String>::new());
+            let on_line = |line: u32| {
+                let rows: Vec<&Row> = rows
+                    .iter()
+                    .filter(|row| row.line == line && row.limit == LimitKind::Feed && row.z[2] == 0.0)
+                    .collect();
+                [rows[0].z[0], rows[rows.len() - 1].z[0]]
+            };
+            // 7.5 mm/s: a set-point is 0.0075 mm from the next.
+            let [first, last] = on_line(3);
+            assert!((first + 4.0).abs() < 0.0076 && (last + 18.0).abs() < 0.0076, "{mode}: {first} {last}");
+            let [first, last] = on_line(6);
+            assert!((first + 20.0).abs() < 0.3 && (last + 40.0).abs() < 0.3, "{mode}: {first} {last}");
+            within_limits(&rows, mode == "SOFT");
+            for row in
+                rows.iter().filter(|row| [3, 6].contains(&row.line) && row.limit == LimitKind::Feed && row.z[2] == 0.0)
+            {
+                let start = if row.line == 3 { 0.0 } else { -20.0 };
+                assert!(off(-1.5 * row.angle / TAU + start, row.z[0], 1.5) < 1e-9, "{row:?}");
+            }
+        }
+    }
+    // What the axes cannot do is told, and their limits hold.
+    let (rows, said) = replay(&laws()[0], "M3 S600\nDITS=0.001\nG33 Z-20 K2 SF=0\nM30\n", false);
+    assert!(said.len() == 1 && said[0].starts_with("P0009 DITS of the thread of line 3"), "{said:?}");
+    within_limits(&rows, true);
+}
+
+#[test]
+fn g63_is_a_straight_line_in_its_block_alone() {
+    let machine = &laws()[0];
+    let (rows, said) = replay(machine, "G0 X5\nS300 M3\nG63 Z-10 F300\nG63 Z0 M4\nX10\nM30\n", false);
+    assert_eq!(said, Vec::<String>::new());
+    for (line, sense) in [(3, 1.0), (4, -1.0)] {
+        let cruising: Vec<&Row> =
+            rows.iter().filter(|row| row.line == line && row.z[2].abs() < 1e-6 && row.z[1].abs() > 1.0).collect();
+        assert!(cruising.len() > 1500, "{line}: {}", cruising.len());
+        // 300 mm/min at 300 rpm: 1 mm a turn.
+        assert!(cruising.iter().all(|row| (row.z[1].abs() - 5.0).abs() < 1e-6), "{line}");
+        assert!(cruising.iter().all(|row| row.speed * sense > 0.85 * 5.0 * TAU), "{line}");
+    }
+    // G0 holds again behind them.
+    assert!(rows.iter().any(|row| row.line == 5 && row.x[1] > 10.0));
+}
+
+#[test]
+fn a_spindle_that_is_started_behind_sposa_turns() {
+    for text in ["S600 M3\nG4 F1\nSPOSA=90\nS300 M4\nG4 F3\nM30\n", "S600 M3\nG4 F1\nSPOSA=90 S300 M4\nG4 F3\nM30\n"] {
+        let (rows, _) = replay(&laws()[0], text, false);
+        let last = rows[rows.len() - 1];
+        assert!((rpm_from_rad_s(last.speed) + 300.0).abs() < 1e-9, "{text}: {last:?}");
+        for pair in rows.windows(2) {
+            let h = pair[1].t - pair[0].t;
+            assert!((pair[1].speed - pair[0].speed).abs() <= ALPHA * h * (1.0 + 1e-9), "{text}: {pair:?}");
+            assert!(
+                (pair[1].angle - pair[0].angle - 0.5 * h * (pair[1].speed + pair[0].speed)).abs() < 1e-4,
+                "{text}: {pair:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_spindle_turns_on_behind_the_last_setpoint() {
+    let machine = machine(&["axes.X.drive.jerk_filter=moving_average", "axes.X.drive.jerk_filter_time_ms=40"]);
+    let source = ProgramSource::from_bytes("on.mpf", "S600 M3\nG1 X20 F9000\nS300\nM30\n".as_bytes());
+    let mut kernel = Kernel::new(Arc::new(machine), source, true).until_rest(true);
+    let mut angles = Vec::new();
+    while kernel.cycle().unwrap() == Status::Running {
+        let spindle = kernel.output().setpoint.unwrap().spindle;
+        angles.push((spindle.angle_rad, spindle.speed_rad_s, kernel.output().setpoint.unwrap().path.limit.kind));
+    }
+    assert!(angles.iter().filter(|(.., kind)| *kind == LimitKind::InPosition).count() > 20);
+    for pair in angles.windows(2) {
+        let [(from, before, _), (to, after, _)] = [pair[0], pair[1]];
+        assert!((to - from - 0.5e-3 * (before + after)).abs() < 1e-4 && after > 0.0 || before == 0.0, "{pair:?}");
+        assert!((after - before).abs() <= ALPHA * 1e-3 * (1.0 + 1e-9), "{pair:?}");
+    }
+}

@@ -2,8 +2,8 @@
 
 use crate::made::machine;
 use sollwert::base::AxisKind;
-use sollwert::identify::{TracedProgram, calibrate};
-use sollwert::interpreter::Setup;
+use sollwert::identify::{Agreement, ControlResult, TracedProgram, calibrate, plan};
+use sollwert::interpreter::{Event, Setup};
 use sollwert::kernel::{Kernel, Status};
 use sollwert::machine::Machine;
 use sollwert::program::ProgramSource;
@@ -15,6 +15,11 @@ const FITTED: &str = "G642 CTOL=0.08 SOFT\nG1 X12 F3000\nX20 Y6\nY16\nX14 Y22\nX
 /// Another path at another feed.
 const UNSEEN: &str = "G642 CTOL=0.05 SOFT\nG1 X9 Y3 F2400\nX15 Y12\nX8 Y18\nX-4 Y15\nX-8 Y5\nX0 Y-6\nX11 Y-4\nX16 Y4\nX7 Y9\nX1 Y4\nM30\n";
 
+/// Short blocks on a wave, and a straight line in small steps.
+const SHORT: &str = "G64 SOFT\nG1 X10 F2500\nR1=0\nAA:\nX=10+R1*0.4 Y=4*SIN(R1*9)\nR1=R1+1\nIF R1<120 GOTOB AA\nG642 CTOL=0.02 F3500\nR1=0\nBB:\nX=57.6-R1*0.3 Y=3*SIN(R1*6)\nR1=R1+1\nIF R1<150 GOTOB BB\nM30\n";
+/// A pocket with rounded corners, in two levels.
+const POCKET: &str = "G17 G642 CTOL=0.05 SOFT\nR1=1\nAA:\nG1 Z=-R1 F600\nX=12*R1 Y0 F1800\nY=7*R1-2*R1\nG3 X=12*R1-2*R1 Y=7*R1 CR=2*R1\nG1 X=-12*R1+2*R1\nG3 X=-12*R1 Y=7*R1-2*R1 CR=2*R1\nG1 Y=-7*R1+2*R1\nG3 X=-12*R1+2*R1 Y=-7*R1 CR=2*R1\nG1 X=12*R1-2*R1\nG3 X=12*R1 Y=-7*R1+2*R1 CR=2*R1\nG1 Y0\nR1=R1+1\nIF R1<4 GOTOB AA\nG0 Z20\nX0 Y0\nM30\n";
+
 fn setup(text: &str) -> Setup {
     Setup::from(ProgramSource::from_bytes("test.mpf", text.as_bytes()))
 }
@@ -24,9 +29,18 @@ fn traced(machine: &Machine, text: &str) -> Trace {
     let mut kernel = Kernel::new(Arc::new(machine.clone()), setup(text), false);
     let linear: Vec<_> = machine.axis_ids().filter(|id| machine.axis(*id).kind == AxisKind::Linear).collect();
     let mut columns = vec![Vec::new(); linear.len()];
+    let mut traced = true;
     loop {
         let status = kernel.cycle().unwrap_or_else(|alarm| panic!("{}", alarm.render(false)));
-        if let Some(setpoint) = kernel.output().setpoint {
+        for event in kernel.output().begun.iter().flat_map(|begun| &begun.events) {
+            if let Event::Trace(starts) = event {
+                traced = *starts;
+                if traced {
+                    columns.iter_mut().for_each(Vec::clear);
+                }
+            }
+        }
+        if let (true, Some(setpoint)) = (traced, kernel.output().setpoint) {
             for (column, id) in columns.iter_mut().zip(&linear) {
                 column.push(setpoint.axes[*id].position_lu);
             }
@@ -54,11 +68,16 @@ fn traced(machine: &Machine, text: &str) -> Trace {
     Trace { name: "made".to_owned(), signals: linear.iter().zip(columns).map(signal).collect(), ..Trace::default() }
 }
 
-#[test]
-fn a_control_with_other_settings_is_found_and_predicts_an_unseen_program() {
-    let truth = machine(
-        "spinner_mvc850",
-        &[
+/// A control to be found: another one than that of the file.
+struct Case {
+    name: &'static str,
+    sets: &'static [&'static str],
+}
+
+const CASES: &[Case] = &[
+    Case {
+        name: "issue",
+        sets: &[
             "smoothing.alpha=2.1",
             "smoothing.tolerance_ratio=0.95",
             "smoothing.tolerance_ratio_reversal=0.75",
@@ -68,31 +87,163 @@ fn a_control_with_other_settings_is_found_and_predicts_an_unseen_program() {
             "axes.Y.transition_jerk_max_m_s3=17",
             "axes.Z.transition_jerk_max_m_s3=17",
         ],
-    );
+    },
+    Case {
+        name: "continuous",
+        sets: &[
+            "feed.time_law=continuous",
+            "smoothing.alpha=2.8",
+            "smoothing.tolerance_ratio=0.7",
+            "axes.X.jerk_max_m_s3=24",
+            "axes.Y.jerk_max_m_s3=24",
+            "axes.Z.jerk_max_m_s3=20",
+            "axes.X.transition_jerk_max_m_s3=16",
+            "axes.Y.transition_jerk_max_m_s3=16",
+            "axes.Z.transition_jerk_max_m_s3=16",
+        ],
+    },
+    Case {
+        name: "per-axis jerk",
+        sets: &[
+            "axes.X.jerk_max_m_s3=30",
+            "axes.Y.jerk_max_m_s3=10",
+            "axes.X.transition_jerk_max_m_s3=22",
+            "axes.Y.transition_jerk_max_m_s3=7",
+            "smoothing.radial_jerk_share=0.6",
+        ],
+    },
+    Case {
+        name: "overload",
+        sets: &[
+            "feed.corner_rule=overload",
+            "feed.overload_factor=3",
+            "smoothing.radial_acceleration_share=0.6",
+            "smoothing.radial_jerk_share=0.3",
+        ],
+    },
+    Case {
+        name: "window 25",
+        sets: &[
+            "look_ahead.blocks=25",
+            "smoothing.radial_acceleration_share=0.4",
+            "axes.X.jerk_max_m_s3=9",
+            "axes.Y.jerk_max_m_s3=9",
+            "axes.X.transition_jerk_max_m_s3=9",
+            "axes.Y.transition_jerk_max_m_s3=9",
+        ],
+    },
+    Case {
+        name: "window 3",
+        sets: &["look_ahead.blocks=3", "smoothing.tolerance_ratio=1.0", "smoothing.tolerance_ratio_reversal=1.0"],
+    },
+    Case {
+        name: "entry",
+        sets: &[
+            "smoothing.blend_law=entry",
+            "smoothing.radial_jerk_share=0.5",
+            "smoothing.radial_acceleration_share=0.5",
+        ],
+    },
+    Case {
+        name: "path limits",
+        sets: &["smoothing.limits=path", "smoothing.alpha=2.0", "axes.Y.transition_jerk_max_m_s3=20"],
+    },
+    Case {
+        name: "corner steps",
+        sets: &[
+            "axes.X.follow_up_tolerance_mm=0.002",
+            "axes.Y.follow_up_tolerance_mm=0.002",
+            "axes.Z.follow_up_tolerance_mm=0.002",
+            "feed.arc_limits=printed",
+            "feed.curvature_jump=printed",
+        ],
+    },
+    Case {
+        name: "everything",
+        sets: &[
+            "feed.time_law=continuous",
+            "look_ahead.blocks=40",
+            "feed.corner_rule=overload",
+            "feed.overload_factor=2",
+            "smoothing.alpha=2.2",
+            "smoothing.tolerance_ratio=0.6",
+            "smoothing.tolerance_ratio_reversal=0.5",
+            "axes.X.jerk_max_m_s3=8",
+            "axes.Y.jerk_max_m_s3=11",
+            "axes.X.transition_jerk_max_m_s3=6",
+            "axes.Y.transition_jerk_max_m_s3=9",
+        ],
+    },
+];
+
+/// Fits a machine file to one program made by another control, and holds what it plans against that and other programs.
+fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
+    let truth = machine("spinner_mvc850", truth);
     let start = machine("spinner_mvc850", &[]);
-    let (fitted, unseen) = (traced(&truth, FITTED), traced(&truth, UNSEEN));
-    let pairs = [
-        TracedProgram { trace: &fitted, setup: setup(FITTED) },
-        TracedProgram { trace: &unseen, setup: setup(UNSEEN) },
-    ];
+    let texts: Vec<&str> = std::iter::once(fitted).chain(unseen.iter().copied()).collect();
+    let traces: Vec<Trace> = texts.iter().map(|text| traced(&truth, text)).collect();
+    let pairs: Vec<TracedProgram<'_>> =
+        traces.iter().zip(&texts).map(|(trace, text)| TracedProgram { trace, setup: setup(text) }).collect();
     let result =
-        calibrate(&pairs[0], &pairs[1..], &start, &mut |_| {}).unwrap_or_else(|d| panic!("{}", d.render(false)));
-    for (key, value) in
-        [("smoothing.alpha", 2.1), ("smoothing.tolerance_ratio", 0.95), ("smoothing.tolerance_ratio_reversal", 0.75)]
-    {
-        let estimate =
-            result.estimates.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{key}: {:?}", result.refusals));
-        assert!((estimate.value / value - 1.0).abs() < 0.02, "{estimate:?}, truth {value}");
+        calibrate(&pairs[..1], &pairs[1..], &start, &mut |_| {}).unwrap_or_else(|d| panic!("{}", d.render(false)));
+    for ((before, after), text) in result.agreements.iter().zip(&texts) {
+        let percent = |a: &Agreement| 100.0 * (a.planned_s / a.traced_s - 1.0);
+        println!(
+            "  {:.2} s: time {:+.2} -> {:+.2} %, feed {:.2} -> {:.2} %, path {:.5} -> {:.5} mm",
+            after.traced_s,
+            percent(before),
+            percent(after),
+            100.0 * before.feed_rms_share,
+            100.0 * after.feed_rms_share,
+            before.path_rms_mm,
+            after.path_rms_mm
+        );
+        // What users need: cycle time within 1 %, feed profile within 3 % of F RMS.
+        assert!(percent(after).abs() < 1.0, "{after:?}\n{text}\n{result:?}");
+        assert!(after.feed_rms_share < 0.03, "{after:?}\n{text}\n{result:?}");
     }
-    // The path of the unseen program is met, and its time and feed come nearer than they were.
+    result
+}
+
+/// The aim on every kind of control, with the program that `--plan` writes.
+#[test]
+#[ignore = "minutes: a calibration for each kind of control"]
+fn every_control_is_found_and_predicts_unseen_programs() {
+    let only = std::env::var("CASE").unwrap_or_default();
+    let start = machine("spinner_mvc850", &[]);
+    let planned = plan(&start, &[]).into_iter().find(|program| program.name == "identify_control.mpf").unwrap().text;
+    for case in CASES.iter().filter(|case| case.name.contains(&only)) {
+        println!("{}", case.name);
+        let result = predicted(case.sets, &planned, &[UNSEEN, SHORT, POCKET]);
+        for e in &result.estimates {
+            println!("    {} {:.4} [{:.4}, {:.4}]", e.key, e.value, e.low, e.high);
+        }
+        println!("    {} plans, {:?}\n    refused {:?}", result.plans, result.choices, result.refusals);
+    }
+}
+
+#[test]
+fn a_control_with_other_settings_is_found_and_predicts_an_unseen_program() {
+    let result = predicted(CASES[0].sets, FITTED, &[UNSEEN]);
+    let of = |key: &str| result.estimates.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{result:?}")).value;
+    for (key, value, share) in [
+        ("smoothing.alpha", 2.1, 0.03),
+        ("smoothing.tolerance_ratio", 0.95, 0.01),
+        ("smoothing.tolerance_ratio_reversal", 0.75, 0.01),
+    ] {
+        assert!((of(key) / value - 1.0).abs() < share, "{key}: {} instead of {value}; {result:?}", of(key));
+    }
+    // Share and transition jerk act as their product: that is what is met.
+    let set = |key: &str| {
+        let text =
+            result.sets.iter().find_map(|set| set.strip_prefix(key)).unwrap_or_else(|| panic!("{:?}", result.sets));
+        text.parse::<f64>().expect("a number")
+    };
+    let radial_m_s3 = set("smoothing.radial_jerk_share=") * set("axes.X.transition_jerk_max_m_s3=");
+    assert!((radial_m_s3 / (0.4 * 17.0) - 1.0).abs() < 0.02, "{radial_m_s3}; {result:?}");
+    assert!(result.choices.contains(&("feed.time_law", "seven-phase".to_owned())), "{:?}", result.choices);
     let (before, after) = result.agreements[1];
     assert!(after.path_rms_mm < 0.05 * before.path_rms_mm, "{after:?}, before {before:?}");
-    assert!(
-        after.feed_rms_share < 0.03 && after.feed_rms_share < before.feed_rms_share,
-        "{after:?}, before {before:?}"
-    );
-    let off = |agreement: &sollwert::identify::Agreement| (agreement.planned_s / agreement.traced_s - 1.0).abs();
-    assert!(off(&after) < 0.5 * off(&before), "{after:?}, before {before:?}");
 }
 
 #[test]
@@ -100,6 +251,6 @@ fn a_trace_of_another_program_is_refused() {
     let start = machine("spinner_mvc850", &[]);
     let other = traced(&start, UNSEEN);
     let pair = TracedProgram { trace: &other, setup: setup(FITTED) };
-    let finding = calibrate(&pair, &[], &start, &mut |_| {}).expect_err("another path");
+    let finding = calibrate(std::slice::from_ref(&pair), &[], &start, &mut |_| {}).expect_err("another path");
     assert_eq!(finding.code, "T0208");
 }

@@ -10,4 +10,5 @@ mod control;
 mod made;
 mod other_plant;
 mod refusals;
+mod speed_loop;
 mod trust;

@@ -66,19 +66,25 @@ fn asked() -> Option<u64> {
     std::env::var("IDENTIFY_REPETITIONS").ok().and_then(|text| text.parse().ok())
 }
 
-/// How often a value was given, and how often its interval held the truth.
-fn counted(repetitions: u64, linear_only: bool, truth: &[(Parameter, f64)]) -> Vec<(u64, u64)> {
-    let mut counts = vec![(0, 0); truth.len()];
+/// How often a value was given, how often its interval held the truth, and how many times the RMS error the mean half width is.
+fn counted(repetitions: u64, linear_only: bool, truth: &[(Parameter, f64)]) -> Vec<(u64, u64, f64)> {
+    let mut counts = vec![(0, 0, 0.0); truth.len()];
+    let mut sums = vec![(0.0, 0.0_f64); truth.len()];
     for seed in 0..repetitions {
         let found = repetition(seed, linear_only);
-        for ((parameter, truth), (given, inside)) in truth.iter().zip(&mut counts) {
+        for (((parameter, truth), (given, inside, _)), sums) in truth.iter().zip(&mut counts).zip(&mut sums) {
             if let Some(estimate) = found.estimate(*parameter) {
                 *given += 1;
+                sums.0 += (estimate.high - estimate.low) / 2.0;
+                sums.1 += (estimate.value - truth).powi(2);
                 *inside += u64::from((estimate.low..=estimate.high).contains(truth));
             }
         }
     }
-    println!("{truth:?}: (given, inside) {counts:?} of {repetitions}");
+    for ((given, _, ratio), (halves, squares)) in counts.iter_mut().zip(sums) {
+        *ratio = halves / (*given as f64 * squares).sqrt();
+    }
+    println!("{truth:?}: (given, inside, half width over RMS error) {counts:?} of {repetitions}");
     counts
 }
 
@@ -97,13 +103,15 @@ fn intervals_contain_the_truth() {
         (Parameter::Gravity, 0.35),
     ];
     let counts = counted(repetitions, true, &truth);
-    for ((parameter, _), (given, inside)) in truth.iter().zip(&counts) {
+    for ((parameter, _), (given, inside, ratio)) in truth.iter().zip(&counts) {
         assert_eq!(*given, repetitions, "{parameter:?}");
         let share = *inside as f64 / *given as f64;
         assert!(share >= least_share(repetitions), "{parameter:?}: the interval holds in {inside} of {given}");
+        // 95 % of a normal error are 2 of its RMS, of a dozen stretches 2.2, and the RMS of 30 errors is known to a quarter.
+        assert!((1.5..4.0).contains(ratio), "{parameter:?}: the half width is {ratio:.2} times the RMS error");
     }
     // An interval that always holds is too wide: not all of them may.
-    let all: u64 = counts.iter().map(|(_, inside)| inside).sum();
+    let all: u64 = counts.iter().map(|(_, inside, _)| inside).sum();
     assert!(all < repetitions * truth.len() as u64, "every interval of {repetitions} repetitions holds");
 }
 
@@ -112,7 +120,7 @@ fn intervals_contain_the_truth() {
 fn intervals_of_the_speed_loop_contain_the_truth() {
     let Some(repetitions) = asked().map(|asked| asked / 5) else { return };
     let truth = [(Parameter::SpeedGain, 2.0), (Parameter::SpeedResetTime, 10.0)];
-    for ((parameter, _), (given, inside)) in truth.iter().zip(counted(repetitions, false, &truth)) {
+    for ((parameter, _), (given, inside, _)) in truth.iter().zip(counted(repetitions, false, &truth)) {
         assert!(given > repetitions * 9 / 10, "{parameter:?}: given {given} times of {repetitions}");
         let share = inside as f64 / given as f64;
         assert!(share >= least_share(repetitions), "{parameter:?}: the interval holds in {inside} of {given}");

@@ -216,6 +216,42 @@ fn follow_runs_on_where_a_control_would_stop() {
     assert!(told.len() == 1 && told[0].message.contains("25050") && !told[0].message.contains("line"), "{told:?}");
 }
 
+/// A table that asks for more than an axis may: what, how much, in how many rows and from when on, and no word of a table that keeps to the limits.
+#[test]
+fn follow_says_which_limits_its_table_exceeds() {
+    let loaded = machine("spinner_mvc850", &["axes.X.velocity_max_m_min=6", "axes.X.travel_mm=[-1, 4]"]);
+    let told = |speed_mm_s: f64, end_mm: f64| {
+        let ramp_s = 0.5;
+        let place = |t_s: f64| {
+            // Constant speed between two quarters of a cosine.
+            let (v, late_s) = (speed_mm_s, t_s - ramp_s);
+            let flat_mm = end_mm - v * ramp_s;
+            let turn = std::f64::consts::PI / ramp_s;
+            let ramp_mm = |s: f64| 0.5 * v * (s - (turn * s).sin() / turn);
+            match t_s {
+                t_s if t_s < ramp_s => ramp_mm(t_s),
+                _ if late_s * v < flat_mm => 0.5 * v * ramp_s + v * late_s,
+                _ => end_mm - ramp_mm((ramp_s - (late_s - flat_mm / v)).max(0.0)),
+            }
+        };
+        let rows: String = (0..2500).map(|k| format!("{k}e-3,{}\n", place(f64::from(k) * 1e-3))).collect();
+        let source = sollwert::base::SourceText::new("table.csv", format!("time_s,X_mm\n{rows}"));
+        let table = SetpointTable::from_csv(&source, &loaded.machine).unwrap();
+        let (start, signals) = (Default::default(), SignalChoice::all());
+        let options = FollowOptions { machine: &loaded, start, recording: None, signals, mantissa_bits: None };
+        let warnings = follow(&table, &options).unwrap().warnings;
+        warnings.iter().filter(|w| w.code == "F0013").map(|w| w.message.clone()).collect::<Vec<String>>()
+    };
+    assert_eq!(told(4.0, 3.0), Vec::<String>::new());
+    let told = told(120.0, 66.0);
+    assert_eq!(told.len(), 1);
+    // 66 mm at 120 mm/s: half a second up, (66 - 60) / 120 = 50 ms flat, half a second down.
+    for words in ["X", "velocity 120.0000 mm/s where 100.0000 mm/s", "62.0000 mm outside its travel (rows: "] {
+        assert!(told[0].contains(words), "{words}: {}", told[0]);
+    }
+    assert!(!told[0].contains("acceleration") && !told[0].contains("jerk"), "{}", told[0]);
+}
+
 /// Without an integral part friction holds the axis off its set-point by up to Tc / (Kp Kv) r = 95 µm: for ever.
 #[test]
 fn an_axis_that_never_arrives_is_an_alarm_and_no_hang() {

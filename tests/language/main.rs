@@ -20,6 +20,7 @@ mod modes;
 mod parser;
 mod print;
 mod shipped;
+mod spindles;
 mod subprograms;
 mod tools;
 mod variables;

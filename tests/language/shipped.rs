@@ -55,8 +55,6 @@ fn shipped_programs_are_clean_and_end_at_rest() {
         let found: Vec<_> = check(&source, &xyz()).iter().map(|found| (found.code, found.line())).collect();
         let wanted: &[_] = match name.as_str() {
             "pocket.mpf" => &[("W0004", 8)],
-            // The machine has no data of its spindle.
-            "tapping.mpf" => &[("W0008", 5)],
             _ => &[],
         };
         assert_eq!(found, wanted, "{name}: nothing else to report");

@@ -5,18 +5,18 @@ use sollwert::machine::{
     AxisChoice, ImportOptions, Imported, ListingFile, Loaded, Origin, export_listing, import_listing, load, shipped,
 };
 
-fn file(name: &str, text: &str) -> ListingFile {
+pub fn file(name: &str, text: &str) -> ListingFile {
     ListingFile { name: name.to_owned(), bytes: text.as_bytes().to_vec() }
 }
 
-fn import(text: &str) -> Imported {
+pub fn import(text: &str) -> Imported {
     import_listing(&[file("data.ini", text)], &ImportOptions::default()).unwrap_or_else(|findings| {
         let shown: Vec<String> = findings.iter().map(|finding| finding.render(false)).collect();
         panic!("{}", shown.join("\n"))
     })
 }
 
-fn codes(text: &str) -> Vec<&'static str> {
+pub fn codes(text: &str) -> Vec<&'static str> {
     match import_listing(&[file("data.ini", text)], &ImportOptions::default()) {
         Ok(_) => Vec::new(),
         Err(findings) => findings.iter().map(|finding| finding.code).collect(),
@@ -24,7 +24,7 @@ fn codes(text: &str) -> Vec<&'static str> {
 }
 
 /// Both, without the file names.
-fn assert_same_machine(one: &Loaded, other: &Loaded) {
+pub fn assert_same_machine(one: &Loaded, other: &Loaded) {
     let texts = [one, other].map(|loaded| format!("{:#?}", loaded.machine));
     for (one_line, other_line) in texts[0].lines().zip(texts[1].lines()) {
         assert_eq!(one_line, other_line, "{}", one.name);
@@ -216,7 +216,7 @@ fn another_machine_fills_gaps_and_the_user_names_axes_and_drives() {
         axes: vec![AxisChoice { theirs: "C1".into(), ours: "Z".into() }],
         drives: vec![AxisChoice { theirs: "AXX_00".into(), ours: "Z".into() }],
         base: Some((base.name.to_string(), base.text_as_used)),
-        name: None,
+        ..ImportOptions::default()
     };
     // C1 as a linear axis named Z, so that the base has the rest of it.
     let text = BY_HAND.replace("$MA_IS_ROT_AX[AX2]=1", "$MA_IS_ROT_AX[AX2]=0");

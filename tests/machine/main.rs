@@ -1,5 +1,6 @@
 //! The machine file from outside: what is accepted, what comes out, and what a person is told.
 
+mod archives;
 mod catalogue;
 mod drives;
 mod listing;

@@ -96,3 +96,30 @@ fn without_drives_only_set_points_remain() {
     assert_eq!(choice.and(&asked).fields(AxisId::new(0)).count(), 4);
     assert!(!choice.and(&asked).axis(AxisId::new(2)));
 }
+
+#[test]
+fn the_spindle_is_chosen_by_its_fields() {
+    let without = machine();
+    let with = sollwert::machine::Machine {
+        spindle: sollwert::machine::load("spinner_mvc850", &[]).unwrap().machine.spindle,
+        ..machine()
+    };
+    let spindle = |text: &str| SignalChoice::parse(text, &with).unwrap().on(&with).spindle();
+    assert_eq!(SignalChoice::all().on(&with).spindle(), ((1 << SPINDLE_FIELDS.len()) - 1, 1));
+    assert_eq!(SignalChoice::all().on(&without).spindle().0, 0);
+    assert_eq!(spindle("X.current").0, 0, "only what is named");
+    assert_eq!(spindle("spindle"), (0b11111, 1));
+    assert_eq!(spindle("Spindle.*/10"), (0b11111, 10));
+    assert_eq!(spindle("spindle.speed_actual,X"), (0b1000, 1));
+    assert_eq!(spindle("spindle.speed_*/4,spindle.angle_setpoint_deg/2"), (0b1101, 2), "the most frequent counts");
+    assert_eq!(spindle("spindle.acceleration_setpoint").0, 0b10000);
+    let refused = SignalChoice::parse("X,spindle.torque", &with).unwrap_err().render(false);
+    assert!(
+        refused.contains(
+            "fields of the spindle: angle_setpoint, angle_actual, speed_setpoint, speed_actual, acceleration_setpoint"
+        ),
+        "{refused}"
+    );
+    let refused = SignalChoice::parse("spindle", &without).unwrap_err().render(false);
+    assert!(refused.contains("not simulated on this machine") && refused.contains("acceleration_rot_s2"), "{refused}");
+}

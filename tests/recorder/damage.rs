@@ -95,6 +95,7 @@ fn a_whole_recording_is_rescued_whole() {
     let (report, messages) = rescued("whole", whole()).unwrap();
     assert!(report.was_whole && report.findings.is_empty() && report.left_out == 0);
     assert_eq!(messages[..], *whole_messages());
+    assert!(std::fs::read(temporary("whole-rescued.mcap")).unwrap() == whole(), "byte for byte");
     // Nothing was lost, so nothing is added: the copy says what the file says.
     let [copy, original] =
         [temporary("whole-rescued.mcap"), file("whole.mcap", whole())].map(|path| Recording::open(&path).unwrap());

@@ -35,6 +35,8 @@ pub fn machine() -> Machine {
     let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
     let mut machine = test_machine::shipped("spinner_mvc850", &sets);
     machine.axes[1].drive = None;
+    // A recording without a spindle; `choice` has one.
+    machine.spindle = None;
     (machine.axes[2].name, machine.axes[2].kind) = ("C".to_owned(), AxisKind::Rotary);
     machine
 }

@@ -115,6 +115,52 @@ fn low_frequency_values_stand_at_their_counters_and_are_held() {
     assert!(told("20 ms after their time") && told("belongs to no signal of the header"), "{:?}", trace.notes);
 }
 
+/// As a recorder writes it (seen in a published file): names of the axes in the header, texts in LFData, calls, rows that begin long after
+/// the start of the job.
+#[test]
+fn the_header_names_the_axes_and_texts_and_calls_are_taken() {
+    let low = |counter: u64, address: &str, sort: &str, value: &str| {
+        format!(
+            "{{\"HFProbeCounter\":{counter},\"address\":\"{address}\",\"value_type\":\"{sort}\",\"value\":{value}}}"
+        )
+    };
+    let head = header(CYCLE)
+        .replace("\"Axis\":\"\",\"Address\":\"DES_POS|1\"", "\"Axis\":\"X1\",\"Address\":\"DES_POS|1\"")
+        .replace("ENC_POS|1", "ENC_POS|6")
+        .replace("\"Axis\":\"\",\"Address\":\"ENC_POS|6\"", "\"Axis\":\"SP1\",\"Address\":\"ENC_POS|6\"")
+        .replace("\"Initial\"", "\"SignalListLFData\":[{\"path\":\"/tool\"},{\"path\":\"/number\"}],\"Initial\"");
+    let payload = [
+        rows(2100..2200),
+        format!("{{\"LFData\":[{}]}}", low(2200, "/tool", "String", "\"182437\"")),
+        format!("{{\"LFData\":[{},{}]}}", low(2200, "/number", "UInt", "\"6\""), low(2210, "/tool", "String", "\"CUTTER\"")),
+        "{\"HFCallEvent\":{\"HFProbeCounter\":2205,\"Channel\":1,\"SeekOffset\":390,\"Path\":\"/_N_MPF_DIR/_CUTTING\"}}".to_owned(),
+        rows(2200..2300),
+    ];
+    let text = format!("{head}\"Payload\":[{}],\n\"Footer\":{{}} }}\n", payload.join(","));
+    let trace = read("named.json", text.as_bytes(), &ImportOptions::default()).unwrap();
+    assert_eq!(trace.signal("DES_POS|1").unwrap().name.as_deref(), Some("X.position_setpoint_mm"));
+    assert_eq!(trace.signal("ENC_POS|6").unwrap().name.as_deref(), Some("SP1.position_measured_deg"));
+    let told: Vec<_> = trace.notes.iter().filter(|note| note.code == "T0011").collect();
+    assert!(told.len() == 1 && told[0].message.contains("1 = X (X1), 6 = SP1 (SP1)"), "{told:?}");
+    let tool = trace.signal("/tool").unwrap();
+    let place = |counter: u32| tool.times.index_at(f64::from(counter - 2100) * 0.002);
+    assert_eq!(place(2199), None);
+    assert_eq!(place(2200).and_then(|at| tool.label(at)), Some("182437"));
+    assert_eq!(place(2250).and_then(|at| tool.label(at)), Some("CUTTER"));
+    assert_eq!(trace.signal("/number").unwrap().value_at(0.2, Method::Hold), 6.0);
+    let call = trace.events.iter().find(|event| event.event.kind.as_deref() == Some("call")).unwrap();
+    assert_eq!(
+        (call.time_s, call.event.line, call.event.program.as_deref()),
+        (0.21, Some(390), Some("/_N_MPF_DIR/_CUTTING"))
+    );
+    // Counter 100 at 40.613 s: the first row, at counter 2100, is 4 s later.
+    assert_eq!(trace.origin.start_utc.as_deref(), Some("2026-06-03T17:57:44.613Z"));
+    // What the user says comes first.
+    let own = ImportOptions { axis_names: vec![(1, "Y".to_owned())], ..ImportOptions::default() };
+    let trace = read("renamed.json", text.as_bytes(), &own).unwrap();
+    assert_eq!(trace.signal("DES_POS|1").unwrap().name.as_deref(), Some("Y.position_setpoint_mm"));
+}
+
 #[test]
 fn a_gzip_is_read_whatever_its_name() {
     let packed = |bytes: &[u8]| {

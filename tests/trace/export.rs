@@ -168,3 +168,47 @@ fn the_drives_follow_the_set_points_of_a_trace() {
         assert!((value - expected).abs() < 1e-6, "{k}: {value} {expected}");
     }
 }
+
+/// A run with a spindle that comes to 600 rpm at 20 rev/s² and is at rest again at 90 deg.
+fn spindle_run(name: &str, choice: &str) -> PathBuf {
+    let sets = ["spindle.acceleration_rot_s2=20".to_owned(), "spindle.lag_ms=0".to_owned()];
+    let loaded = sollwert::machine::load("spinner_mvc850", &sets).unwrap();
+    let text = "S600 M3\nG4 F1\nG1 X2 F600\nM30\n";
+    let path = temporary(name);
+    let options = sollwert::kernel::RunOptions {
+        machine: &loaded,
+        setup: sollwert::program::ProgramSource::from_bytes("s.mpf", text.as_bytes()).into(),
+        overrides: sollwert::feed::OverrideSchedule::none(),
+        drives: true,
+        recording: Some(&path),
+        mantissa_bits: None,
+        signals: sollwert::recorder::SignalChoice::parse(choice, &loaded.machine).unwrap(),
+        threads: 1,
+        pace_ratio: None,
+    };
+    sollwert::kernel::run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{error:?}"));
+    path
+}
+
+#[test]
+fn the_spindle_is_in_tables_with_its_names() {
+    let path = spindle_run("spindle.mcap", "X.position_setpoint,spindle.angle_setpoint,spindle.speed_actual");
+    let columns = ["spindle.angle_setpoint_deg", "spindle.speed_actual_rpm"];
+    // Parquet is written and not read: X, the path and the two of the spindle.
+    exported(&path, ExportForm::Parquet, "spindle.parquet");
+    {
+        let table = exported(&path, ExportForm::Csv, "spindle.csv");
+        let back = import(&table, &ImportOptions::default()).unwrap();
+        let names: Vec<&str> = back.signals.iter().filter_map(|signal| signal.name.as_deref()).collect();
+        assert!(columns.iter().all(|name| names.contains(name)), "{names:?}");
+        assert_eq!(names.iter().filter(|name| name.starts_with("spindle.")).count(), 2, "{names:?}");
+        let [angle, speed] = columns.map(|name| back.signal(name).unwrap());
+        assert_eq!((angle.unit.as_str(), speed.unit.as_str()), ("deg", "rpm"));
+        for (k, (angle_deg, speed_rpm)) in angle.values.iter().zip(&speed.values).enumerate() {
+            // Half a second of ramp, 10 rev/s from there on.
+            let t = angle.times.time_s(k);
+            let turns = if t < 0.5 { 10.0 * t * t } else { 2.5 + 10.0 * (t - 0.5) };
+            assert!((angle_deg - 360.0 * turns).abs() < 1e-6 && (speed_rpm - 1200.0 * t.min(0.5)).abs() < 1e-6, "{t}");
+        }
+    }
+}

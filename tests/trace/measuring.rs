@@ -78,3 +78,44 @@ fn a_series_has_the_time_of_its_object_and_a_response_is_pairs() {
     assert_eq!(trace.signal("m_pPlant.m_ValueVector.im").unwrap().values, [-0.25, -8.0]);
     assert!(!trace.notes.iter().any(|note| note.message.contains("is assumed")), "{:?}", trace.notes);
 }
+
+/// As auto servo tuning writes it (seen in a published file): CDATA over several lines, short arrays with commas, empty arrays, the same
+/// name in many objects.
+#[test]
+fn a_file_of_auto_servo_tuning_has_cdata_and_arrays_with_commas() {
+    let folded = |values: &[f64]| {
+        let text: Vec<u8> = array(values).into_bytes();
+        let lines: Vec<&str> = text.chunks(12).map(|line| std::str::from_utf8(line).unwrap()).collect();
+        format!("<raw name=\"m_pNumberArray\"><![CDATA[\n{}\n]]></raw>", lines.join("\n"))
+    };
+    let plant: Vec<f64> = (0..40).map(|k| 0.1 / f64::from(k + 1) - f64::from(k % 3)).collect();
+    let frequencies: Vec<f64> = (0..20).map(|k| 2.5 * f64::from(k + 1)).collect();
+    let numeric = |name: &str, sort: &str, format: &str, raw: &str| {
+        format!(
+            "<NumericArray satclassid=\"4\" elementtype=\"{sort}\" format=\"{format}\" name=\"{name}\">\n\
+             <unsigned_int name=\"m_length\">1</unsigned_int>\n{raw}\n</NumericArray>\n"
+        )
+    };
+    let text = format!(
+        "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<!-- 4.96.0.0.1 -->\n<DynamicModelAxisController satclassid=\"30\">\n\
+         <float name=\"m_dKpGain\">3.5</float><Loop name=\"m_Inner\"><float name=\"m_dKpGain\">7.25</float></Loop>\n\
+         {}{}<FrequencyResponseFunction name=\"m_pPlant\">{}{}</FrequencyResponseFunction></DynamicModelAxisController>\n",
+        numeric("m_none", "int", "CSV", "<raw name=\"m_pNumberArray\"></raw>"),
+        numeric("m_poles", "double", "CSV", "<raw name=\"m_pNumberArray\">59.061,1205.5,-1e-3</raw>"),
+        numeric("m_ValueVector", "ComplexNumber", "base85", &folded(&plant)),
+        numeric("m_FrequencyVector", "double", "base85", &folded(&frequencies)),
+    );
+    let trace = read("ast.xml", text.as_bytes(), &ImportOptions::default()).unwrap();
+    assert_eq!(trace.origin.format, TraceFormat::MeasuringXml);
+    assert_eq!(trace.signal("m_poles").unwrap().values, [59.061, 1205.5, -1e-3]);
+    assert_eq!(trace.signal("m_pPlant.m_FrequencyVector").unwrap().values, frequencies);
+    let of = |start: usize| plant.iter().skip(start).step_by(2).copied().collect::<Vec<f64>>();
+    assert_eq!(trace.signal("m_pPlant.m_ValueVector.re").unwrap().values, of(0));
+    assert_eq!(trace.signal("m_pPlant.m_ValueVector.im").unwrap().values, of(1));
+    assert_eq!(trace.signals.len(), 4, "an array without numbers is no signal");
+    let numbers = &trace.metadata["measuring"];
+    assert_eq!((numbers["m_dKpGain"].as_str(), numbers["m_Inner.m_dKpGain"].as_str()), ("3.5", "7.25"));
+    let other = text.replace("format=\"CSV\" name=\"m_poles\"", "format=\"hex\" name=\"m_poles\"");
+    let refused = read("hex.xml", other.as_bytes(), &ImportOptions::default()).unwrap_err();
+    assert!(refused.code == "T0004" && refused.message.contains("hex") && refused.place.is_some(), "{refused:?}");
+}

@@ -15,18 +15,27 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let scope =
         format!("Name\tp\nFile\tf\n\nName\tAxes.X.ActPos\tName\tb\nSampleTime[ms]\t1\tSampleTime[ms]\t1\n{scope}");
     let hal: String = (0..40).map(|k| format!("{k};1.5\n")).collect();
+    let paired: String = (0..40).map(|k| format!("a +{k},5 joint.0.pos-cmd -{k},0 \n")).collect();
+    let clock: String = (0..40).map(|k| format!("23:59:{:02};{k}\n", k + 19)).collect();
     let sampler: String = (0..40).map(|k| format!("{k} 1.5 2\n")).collect();
-    let edge = "{\"Header\":{\"CycleTimeMs\":2,\"SignalListHFData\":[{\"Address\":\"CYCLE\"},{\"Address\":\"DES_POS|1\"}]},\n\
+    let edge = "{\"Header\":{\"CycleTimeMs\":2,\"SignalListHFData\":[{\"Address\":\"CYCLE\"},{\"Address\":\"DES_POS|1\",\"Axis\":\"X1\"}],\
+        \"SignalListLFData\":[{\"path\":\"/t\"}],\"Initial\":{\"Time\":\"2026-06-03T17:57:40.613Z\",\"HFProbeCounter\":0}},\n\
         \"Payload\":[{\"HFData\":[[1,2.5],[2,3.5],[3,1e-3]]},{\"HFBlockEvent\":{\"HFProbeCounter\":2,\"SeekOffset\":4,\"GCode\":\"G1\"}},\
+        {\"HFCallEvent\":{\"HFProbeCounter\":3,\"Path\":\"/P\"}},\
+        {\"LFData\":[{\"HFProbeCounter\":4,\"address\":\"/t\",\"value_type\":\"String\",\"value\":\"a\"}]},\
         {\"HFData\":[[4,2.5],[5,3.5]]}],\n\"Footer\":{}}\n";
     let measuring = "<ResponseTestCustom><float name=\"m_dProcessUpdateTime\">0.000125</float><object name=\"a\">\
         <NumericArray elementtype=\"double\" format=\"base85\"><raw name=\"m_pNumberArray\">..kLLiU.kLLiU.</raw></NumericArray>\
+        <NumericArray format=\"base85\"><raw name=\"m_pNumberArray\"><![CDATA[\n..kLLiU.\n]]></raw></NumericArray>\
+        <NumericArray format=\"CSV\"><raw name=\"m_pNumberArray\">1.5,-2e3,7</raw></NumericArray>\
         </object></ResponseTestCustom>";
     vec![
         ("xml", session.text().into_bytes()),
         ("csv", format!("time_s,X_mm,word\n{csv}").into_bytes()),
         ("twincat", scope.into_bytes()),
         ("halscope", format!("# Sampling period is 1000000 ns\njoint.0.pos-cmd;b\n{hal}").into_bytes()),
+        ("halscope 2.8", format!("Sampling period is 100000 nSec \n\n{paired}").into_bytes()),
+        ("clock", format!("Zeit;X_mm\n{clock}").into_bytes()),
         ("halsampler", sampler.into_bytes()),
         ("edge", edge.as_bytes().to_vec()),
         ("measuring", measuring.as_bytes().to_vec()),

@@ -129,6 +129,34 @@ fn what_is_broken_is_repaired_and_said() {
 }
 
 #[test]
+fn a_trace_that_runs_backwards_is_refused_and_no_index_is_no_axis() {
+    let text = Session::new(linear()).text();
+    let (mut records, other): (Vec<&str>, Vec<&str>) =
+        text.lines().partition(|line| line.trim_start().starts_with("<rec "));
+    let place = other.iter().position(|line| line.contains("</dataFrame>")).unwrap();
+    let file = |records: &[&str]| {
+        let (head, tail) = other.split_at(place);
+        [head, records, tail].concat().join("\n")
+    };
+    records.reverse();
+    let refused = read("reversed.xml", file(&records).as_bytes(), &named("X")).unwrap_err();
+    assert!(refused.code == "T0009" && refused.message.contains("backwards"), "{refused:?}");
+    assert_eq!(refused.place.unwrap().line as usize, place + 2);
+    // A record that stands a thousand times counts once, with its first values.
+    records.reverse();
+    let many: Vec<&str> = records.iter().flat_map(|record| std::iter::repeat_n(*record, 100)).collect();
+    let trace = read("repeated.xml", file(&many).as_bytes(), &named("X")).unwrap();
+    let once = read("once.xml", file(&records).as_bytes(), &named("X")).unwrap();
+    assert_eq!(trace.signals, once.signals);
+    assert_eq!(codes(&trace), ["T0009"]);
+    // The unit number is no axis.
+    let odd = text.replace("[u1, 1]", "[u1, ?]");
+    let trace = read("odd_index.xml", odd.as_bytes(), &named("X")).unwrap();
+    let setpoint = trace.signals.iter().find(|signal| signal.original.contains("CmdPos")).unwrap();
+    assert_eq!(setpoint.name, None, "{setpoint:?}");
+}
+
+#[test]
 fn any_encoding_is_read() {
     let text = Session::new(linear()).text().replace("a &lt; b", "Lageistwert Achse für Prüfung");
     let mut latin: Vec<u8> = Vec::new();

@@ -85,6 +85,29 @@ fn halscope_says_its_period() {
     assert_eq!(trace.signal("X.following_error_mm").unwrap().values[3], 1e-3);
 }
 
+/// As halscope of LinuxCNC up to 2.8 saves it (seen in published files): a name before every value, decimal comma by locale, a pin twice.
+#[test]
+fn halscope_of_older_versions_has_a_name_before_every_value() {
+    let mut text = String::from("Sampling period is 100000 nSec \n\n");
+    for k in 0..60 {
+        let value = format!("{:+.14}", f64::from(k) * 0.25 - 4.0).replace('.', ",");
+        text += &format!("arc-ok {:+.14} joint.2.motor-pos-cmd {value} arc-ok +1,00000000000000 \n", f64::from(k / 30));
+    }
+    text += "arc-ok +1,0 joint.1.motor-pos-cmd +1,0 arc-ok +1,0\n";
+    let trace = read("old.log", text.as_bytes(), &ImportOptions::default()).unwrap();
+    assert_eq!(trace.origin.format, TraceFormat::Halscope);
+    assert_eq!(trace.signals.len(), 3);
+    let setpoint = trace.signal("Z.position_setpoint_mm").unwrap();
+    assert_eq!((setpoint.len(), setpoint.times.period_s(), setpoint.times.end_s()), (60, Some(1e-4), Some(0.0059)));
+    assert_eq!((setpoint.values[0], setpoint.values[59]), (-4.0, 10.75));
+    assert_eq!((trace.signals[0].values[29], trace.signals[0].values[30]), (0.0, 1.0));
+    assert!(
+        trace.notes.iter().any(|note| note.code == "T0008" && note.message.contains("left out")),
+        "{:?}",
+        trace.notes
+    );
+}
+
 #[test]
 fn halsampler_counts_and_an_overrun_is_a_gap() {
     let row = |k: i32| format!("{k} {} {}\n", f64::from(k) * 0.5, 7);

@@ -95,6 +95,64 @@ fn dates_are_times() {
 }
 
 #[test]
+fn a_time_that_runs_backwards_is_refused_with_its_place() {
+    // Another column increases, but is not the time.
+    let rows = |time: &dyn Fn(usize) -> String| {
+        (0..ROWS).map(|k| format!("{};{};{k}\n", time(k), position(k))).collect::<String>()
+    };
+    let read_rows = |head: &str, given: Option<&str>, time: &dyn Fn(usize) -> String| {
+        read("backwards.csv", format!("{head};X_mm;count\n{}", rows(time)).as_bytes(), &options(given))
+    };
+    let down = |k: usize| format!("{:.3}", (ROWS - k) as f64 * 0.002);
+    let still = |_: usize| "4".to_owned();
+    let up_then_down = |k: usize| format!("{:.3}", (k as f64 - 20.0).abs() * -0.002);
+    let cases: [(&dyn Fn(usize) -> String, u32); 3] = [(&down, 3), (&still, 3), (&up_then_down, 23)];
+    for (time, line) in cases {
+        for (head, given) in [("time", None), ("Zeit [s]", None), ("clock", Some("clock"))] {
+            let refused = read_rows(head, given, time).unwrap_err();
+            let place = refused.place.as_ref().unwrap();
+            assert_eq!((refused.code, place.line), ("T0009", line), "{head}: {refused:?}");
+        }
+        // The user knows better.
+        assert_position(&read_rows("time", Some("0.002"), time).unwrap(), "X_mm");
+    }
+    // Few digits: a time that stands twice is taken once, and said; where most would be lost, the table is refused.
+    let coarse = |k: usize| format!("{:.3}", (k / 2) as f64 * 0.004);
+    let trace = read_rows("time", None, &coarse).unwrap();
+    assert!(said(&trace).contains("time column `time`"), "{}", said(&trace));
+    assert_eq!(trace.signal("X_mm").unwrap().len(), ROWS / 2);
+    assert!(
+        trace.notes.iter().any(|note| note.code == "T0009" && note.message.contains("150 times")),
+        "{:?}",
+        trace.notes
+    );
+    let refused = read_rows("time", None, &|k| format!("{:.2}", k as f64 * 0.002)).unwrap_err();
+    assert!(refused.code == "T0009" && refused.message.contains("of 300 samples"), "{refused:?}");
+}
+
+#[test]
+fn rows_of_any_length_are_no_table_of_one_column() {
+    let rows: String = (0..400).map(|k| format!("{}{}\n", k as f64 * 0.002, ";1".repeat(k % 9))).collect();
+    assert_eq!(read("ragged.csv", format!("t;a;b\n{rows}").as_bytes(), &options(None)).unwrap_err().code, "T0016");
+    let column: String = (0..400).map(|k| format!("{}\n", k as f64 * 0.5)).collect();
+    let trace = read("column.csv", format!("X_mm\n{column}").as_bytes(), &options(Some("0.002"))).unwrap();
+    assert_eq!((trace.signals.len(), trace.signals[0].values[399]), (1, 199.5));
+}
+
+#[test]
+fn times_of_day_go_on_over_midnight() {
+    let clock = |k: usize| {
+        let ms = 2 * k as u64 + 86_399_700;
+        let (s, ms) = (ms / 1000 % 86_400, ms % 1000);
+        format!("{:02}:{:02}:{:02},{ms:03}", s / 3600, s / 60 % 60, s % 60)
+    };
+    let rows: String = (0..ROWS).map(|k| format!("{};{}\n", clock(k), position(k))).collect();
+    let trace = read("clock.csv", format!("Zeit;X_mm\n{rows}").as_bytes(), &options(None)).unwrap();
+    assert_position(&trace, "X_mm");
+    assert!(said(&trace).contains("times of day"), "{}", said(&trace));
+}
+
+#[test]
 fn a_slow_signal_is_not_one_with_gaps_and_a_hole_is() {
     let row = |k: usize| {
         let slow = if k % 2 == 1 { position(k).to_string() } else { String::new() };

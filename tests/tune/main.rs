@@ -2,6 +2,7 @@
 
 #[path = "../random/mod.rs"]
 mod random;
+mod trust;
 
 use random::Random;
 use sollwert::base::units::s_from_ms;

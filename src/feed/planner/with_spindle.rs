@@ -41,7 +41,7 @@ impl Planner {
             stop_at_end: true,
             ..contour.clone()
         };
-        (self.last, self.last_thread) = (None, None);
+        (self.last, self.last_thread, self.ramp) = (None, None, None);
         self.entries.push_back(Entry {
             path: JointPath { contour: wait, transformation: path.transformation.clone() },
             motion: Motion::WaitsForSpindle,
@@ -128,12 +128,21 @@ impl Planner {
         let ready_s = self.spindle.settled_s().max(now_s);
         let state = self.spindle.at(ready_s);
         let acceleration_rad_s2 = self.spindle.following_acceleration_rad_s2();
-        let turning =
-            Turning { now_s, ready_s, angle_rad: state.angle_rad, speed_rad_s: state.speed_rad_s, acceleration_rad_s2 };
+        let turning = match piece.thread.simulated {
+            true => Turning {
+                now_s,
+                ready_s,
+                angle_rad: state.angle_rad,
+                speed_rad_s: state.speed_rad_s,
+                acceleration_rad_s2,
+            },
+            false => Turning { now_s, ready_s: now_s, angle_rad: 0.0, speed_rad_s: 0.0, acceleration_rad_s2: None },
+        };
         // The front entry has left the window: the next one is its first.
         let goes_on = |next: &Entry| matches!(&next.motion, Motion::Threads(next) if next.goes_on);
         let leaves = front.rests_after || !self.entries.front().is_some_and(goes_on);
         let (law, synchronous) = piece.law(&turning, leaves);
+        self.tell_short_runs(piece, front, leaves);
         if !synchronous {
             let block = front.path.contour.block;
             let most_rpm = rpm_from_rad_s(piece.room_share(leaves) * piece.thread.speed_rad_s);
@@ -146,12 +155,29 @@ impl Planner {
             let help = format!("begin earlier, end later, or give S{:.1} or less", rounded_down(most_rpm));
             self.findings.push((block, Diagnostic::warning("P0007", message).help(help)));
         }
-        if !piece.thread.is_cut() {
+        if !piece.thread.is_cut() && piece.thread.simulated {
             let motion = spindle.get_or_insert_with(|| self.spindle.motion(now_s));
             motion.follows_rad_per_lu = Some(piece.turn_rad_per_lu());
             self.spindle.follow(now_s + law.duration_s(), piece.turn_rad());
         }
         law
+    }
+
+    /// DITS and DITE that the axes cannot keep.
+    fn tell_short_runs(&mut self, piece: &ThreadPiece, front: &Entry, leaves: bool) {
+        if !piece.thread.is_cut() {
+            return;
+        }
+        for (run_lu, word) in piece.short_runs_lu(leaves).into_iter().zip(["DITS", "DITE"]) {
+            let Some([programmed_lu, least_lu]) = run_lu else { continue };
+            let block = front.path.contour.block;
+            let message = format!(
+                "{word} of the thread of line {} is {programmed_lu:.3} mm of path, and its axes need {least_lu:.3} mm (alarm 22280)",
+                block.line
+            );
+            let help = "the run has what the axes need; the control would drive them beyond their acceleration. Give a longer one, a lower S, or -1 for what is needed";
+            self.findings.push((block, Diagnostic::warning("P0009", message).help(help)));
+        }
     }
 }
 
@@ -166,6 +192,6 @@ fn rounded_down(speed_rpm: f64) -> f64 {
 }
 
 /// Events that make another spindle motion.
-fn turns(event: &Event) -> bool {
-    matches!(event, Event::MFunction(3 | 4 | 5 | 19) | Event::SpindlePosition(_))
+pub(super) fn turns(event: &Event) -> bool {
+    matches!(event, Event::MFunction(3 | 4 | 5 | 19 | 70) | Event::SpindlePosition(_))
 }

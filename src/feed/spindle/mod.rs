@@ -3,21 +3,23 @@
 //! In: `[spindle]` of the machine file, the events of pieces when they are pushed and when they begin. Out: whether the path must rest before a piece, when
 //! the spindle is near its speed or at its position, its motion for the interpolator. As on the control a feed waits only after a change of the speed that
 //! is programmed, and only where it begins: a spindle that slows down under load stops nothing. M5 is waited for where the machine file says so.
-//! Does not know feeds a revolution: they count with the programmed speed, which the spindle then has but for the tolerance.
+//! Does not know feeds a revolution: `ramping_feed` makes them follow the ramp.
 
 mod course;
 
+use super::planner::Ramp;
 use super::{SpindleMotion, SpindlePhase};
 use crate::base::units::rad_s_from_rpm;
 use crate::interpreter::{Event, SpindlePositioning};
 use crate::machine::SpindleSettings;
 use course::{Course, Target};
 
-/// M3, M4, M5 and M19.
+/// M3, M4, M5, M19 and M70: axis mode, in which it stands.
 const CLOCKWISE: u32 = 3;
 const COUNTER_CLOCKWISE: u32 = 4;
 const STOP: u32 = 5;
 const POSITION: u32 = 19;
+const AXIS_MODE: u32 = 70;
 
 /// What S and M say.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,6 +33,8 @@ struct Words {
 pub(super) struct Spindle {
     /// `None`: it is at its speed and position at once.
     settings: Option<SpindleSettings>,
+    /// Accelerations of the machine, without ACC.
+    accelerations_rad_s2: [f64; 2],
     /// Of the pieces that were pushed.
     pushed: Words,
     /// A change that no feed has waited for yet was pushed.
@@ -57,7 +61,7 @@ impl Words {
                 Event::SpindleSpeed { speed_rpm } => self.speed_rad_s = rad_s_from_rpm(*speed_rpm),
                 Event::MFunction(CLOCKWISE) => self.sense_ratio = 1.0,
                 Event::MFunction(COUNTER_CLOCKWISE) => self.sense_ratio = -1.0,
-                Event::MFunction(STOP | POSITION) | Event::SpindlePosition(_) => self.sense_ratio = 0.0,
+                Event::MFunction(STOP | POSITION | AXIS_MODE) | Event::SpindlePosition(_) => self.sense_ratio = 0.0,
                 _ => {}
             }
         }
@@ -68,8 +72,10 @@ impl Words {
 impl Spindle {
     /// At rest.
     pub fn new(settings: Option<SpindleSettings>) -> Self {
+        let accelerations = |s: &SpindleSettings| [s.acceleration_rad_s2, s.positioning_acceleration_rad_s2];
         Self {
             settings,
+            accelerations_rad_s2: settings.as_ref().map_or([0.0; 2], accelerations),
             pushed: Words::default(),
             changed: false,
             begun: Words::default(),
@@ -97,17 +103,29 @@ impl Spindle {
         if events.is_empty() {
             return;
         }
-        let mut positions = events.iter().filter_map(|event| match event {
-            Event::SpindlePosition(positioning) => Some(positioning),
-            _ => None,
-        });
-        let changes = self.begun.take(events);
-        if let Some(positioning) = positions.next_back() {
-            let SpindlePositioning { angle_rad, approach, .. } = **positioning;
-            self.course.position(time_s, Target { angle_rad, approach }, self.settings.as_ref());
-            (self.ready_s, self.fresh) = (self.course.settled_s(), true);
-        } else if changes {
-            self.turn(time_s);
+        self.take_acceleration(events);
+        // In their order: M3 behind SPOSA turns it, and not to the position.
+        for event in events {
+            let changes = self.begun.take(std::slice::from_ref(event));
+            if let Event::SpindlePosition(positioning) = event {
+                let SpindlePositioning { angle_rad, approach, .. } = **positioning;
+                self.course.position(time_s, Target { angle_rad, approach }, self.settings.as_ref());
+                (self.ready_s, self.fresh) = (self.course.settled_s(), true);
+            } else if changes {
+                self.turn(time_s);
+            }
+        }
+    }
+
+    /// ACC of the spindle.
+    fn take_acceleration(&mut self, events: &[Event]) {
+        let Some(settings) = &mut self.settings else { return };
+        for event in events {
+            if let Event::SpindleAcceleration { ratio } = event {
+                let [speed_control, position_control] = self.accelerations_rad_s2.map(|limit| limit * ratio);
+                settings.acceleration_rad_s2 = speed_control;
+                settings.positioning_acceleration_rad_s2 = position_control;
+            }
         }
     }
 
@@ -118,6 +136,11 @@ impl Spindle {
         self.course.turn(time_s, target_rad_s, acceleration_rad_s2);
         self.fresh = true;
         self.ready_s = match &self.settings {
+            // What turns the other way has no feed.
+            Some(SpindleSettings { starts_at_once: true, acceleration_rad_s2, .. }) if target_rad_s != 0.0 => {
+                let speed_rad_s = self.course.at(time_s).speed_rad_s * self.begun.sense_ratio;
+                time_s + (-speed_rad_s).max(0.0) / acceleration_rad_s2
+            }
             Some(SpindleSettings { acceleration_rad_s2, tolerance_share, .. }) => {
                 time_s + (way_rad_s - tolerance_share * target_rad_s.abs()).max(0.0) / acceleration_rad_s2
             }
@@ -150,6 +173,19 @@ impl Spindle {
     /// When it has come to the speed at which it stays.
     pub fn settled_s(&self) -> f64 {
         self.course.settled_s()
+    }
+
+    /// The ramp that it is in at a time; `None`: it has its speed, stands, or still turns the other way.
+    pub fn ramp(&self, time_s: f64) -> Option<Ramp> {
+        let now = self.course.at(time_s);
+        let target_rad_s = self.begun.target_rad_s();
+        if self.course.settled_s() <= time_s || target_rad_s == 0.0 || now.acceleration_rad_s2 == 0.0 {
+            return None;
+        }
+        let speed_rad_s = now.speed_rad_s * self.begun.sense_ratio;
+        let acceleration_rad_s2 = now.acceleration_rad_s2.abs();
+        let ramp = Ramp { speed_rad_s, target_rad_s: target_rad_s.abs(), acceleration_rad_s2, turned_rad: 0.0 };
+        (speed_rad_s >= 0.0 && speed_rad_s != ramp.target_rad_s).then_some(ramp)
     }
 
     /// State at a time, as far as is known.

@@ -36,7 +36,9 @@ const MACHINE_AXES: u32 = 31;
 pub(super) fn find(draft: &mut Draft<'_>) -> Result<Vec<FoundAxis>, Vec<Diagnostic>> {
     let mut found: Vec<FoundAxis> = Vec::new();
     for id in draft.listing.axes() {
-        let number = number_of(draft, &id, found.len() as u32 + 1);
+        let taken: Vec<u32> = found.iter().map(|axis| axis.number).chain(numbered(draft)).collect();
+        let free = (1..).find(|number| !taken.contains(number)).unwrap_or(MACHINE_AXES);
+        let number = number_of(draft, &id, free);
         match found.iter_mut().find(|axis| axis.number == number) {
             Some(axis) => axis.theirs.push(id),
             None => found.push(FoundAxis { ours: String::new(), theirs: vec![id], number, kind: AxisKind::Linear }),
@@ -47,6 +49,7 @@ pub(super) fn find(draft: &mut Draft<'_>) -> Result<Vec<FoundAxis>, Vec<Diagnost
     for axis in &mut found {
         name(draft, axis);
     }
+    merge(draft, &mut found);
     carried_only(draft, &mut found);
     if found.len() > AXES_MAX {
         let left: Vec<&str> = found[AXES_MAX..].iter().map(|axis| axis.ours.as_str()).collect();
@@ -60,6 +63,11 @@ pub(super) fn find(draft: &mut Draft<'_>) -> Result<Vec<FoundAxis>, Vec<Diagnost
         return Err(vec![Diagnostic::error("M0301", "the data name no axis of a path").help(help)]);
     }
     Ok(found)
+}
+
+/// Numbers that data name: `AX3`.
+fn numbered(draft: &Draft<'_>) -> Vec<u32> {
+    draft.listing.axes().iter().filter_map(|id| id.strip_prefix("AX")?.parse().ok()).collect()
 }
 
 fn number_of(draft: &mut Draft<'_>, id: &str, next: u32) -> u32 {
@@ -129,6 +137,11 @@ fn name(draft: &mut Draft<'_>, axis: &mut FoundAxis) {
     if let Some(machine) = machine.clone().filter(|machine| !axis.theirs.contains(machine)) {
         axis.theirs.push(machine);
     }
+    // `$MD_` and some listings have the number where others have the name.
+    let by_number = format!("AX{}", axis.number);
+    if !axis.theirs.contains(&by_number) {
+        axis.theirs.push(by_number);
+    }
     let of_comment = carried_name(draft, axis);
     let of_channel = channel_place(draft, axis.number).flatten().and_then(|place| {
         let name = draft.listing.text(Scope::Channel, "AXCONF_CHANAX_NAME_TAB", place)?;
@@ -167,6 +180,32 @@ fn name(draft: &mut Draft<'_>, axis: &mut FoundAxis) {
     draft.put_number(&axis.key("index"), f64::from(axis.number), Origin::Datum, &first, None);
     let shown = if first.starts_with("AX") { first } else { format!("AX{}", axis.number) };
     draft.put_word(&axis.key("machine_axis"), &shown, Origin::Derived, "name in the data");
+}
+
+/// Data that name one axis in two ways, `AX1` and `X1`, and no MD10000 that says so.
+fn merge(draft: &mut Draft<'_>, found: &mut Vec<FoundAxis>) {
+    let mut merged: Vec<FoundAxis> = Vec::with_capacity(found.len());
+    for axis in found.drain(..) {
+        match merged.iter_mut().find(|known| known.ours == axis.ours) {
+            Some(known) => {
+                let message = format!(
+                    "{} and {} are both named {}: taken as one axis",
+                    known.theirs.join(", "),
+                    axis.theirs.join(", "),
+                    known.ours
+                );
+                let help = "if they are two, name them with --axis";
+                draft.warnings.push(Diagnostic::warning("M0309", message).help(help));
+                known.theirs.extend(axis.theirs);
+                draft.put_number(&known.key("index"), f64::from(known.number), Origin::Datum, "of the axis", None);
+                if let Some(first) = known.theirs.first().filter(|first| first.starts_with("AX")) {
+                    draft.put_word(&known.key("machine_axis"), first, Origin::Derived, "name in the data");
+                }
+            }
+            None => merged.push(axis),
+        }
+    }
+    *found = merged;
 }
 
 /// The axis whose comment says `machine_axis = "AX1"`.

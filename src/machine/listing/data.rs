@@ -19,6 +19,8 @@ pub(super) enum Scope {
     ChannelSetting,
     /// `$MA_`.
     Axis,
+    /// `$TC_CARRm[n]`: tool carriers with orientable axes.
+    ToolCarrier,
 }
 
 impl Scope {
@@ -29,6 +31,7 @@ impl Scope {
             Self::Channel => "$MC_",
             Self::ChannelSetting => "$SC_",
             Self::Axis => "$MA_",
+            Self::ToolCarrier => "$TC_",
         }
     }
 }
@@ -85,6 +88,8 @@ pub(super) struct Listing {
     /// Names of members that are compiled, and of those that are of no interest.
     pub binary: Vec<String>,
     pub inch: Option<Spot>,
+    /// A line says that the values are metric.
+    pub metric: bool,
 }
 
 /// The parameters of one drive.
@@ -94,6 +99,8 @@ pub(super) struct DriveObject {
     pub file: String,
     /// From `;#sollwert drive X`.
     pub axis: Option<String>,
+    /// Of a drive of the 840D pl: its number, which MD30110 of an axis names.
+    pub module: Option<u32>,
     pub parameters: BTreeMap<(u32, u32), Datum>,
 }
 
@@ -112,6 +119,10 @@ impl DriveObject {
         let datum = self.parameters.get_mut(&(number, index))?;
         datum.used = true;
         match datum.literal {
+            // Data of the 840D pl stand for the parameters of today: they are named as they were written.
+            Literal::Number(value) if datum.spot.text.contains("$MD_") => {
+                Some((value, datum.spot.text.split('=').next().unwrap_or_default().trim().to_owned()))
+            }
             Literal::Number(value) => Some((value, format!("p{number:04}[{index}]"))),
             Literal::Text(_) => None,
         }

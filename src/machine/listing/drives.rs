@@ -46,7 +46,7 @@ pub(super) fn all(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
     draft.listing.drives = objects;
 }
 
-fn axis_of<'a>(draft: &Draft<'_>, object: &DriveObject, axes: &'a [FoundAxis]) -> Option<&'a FoundAxis> {
+fn axis_of<'a>(draft: &mut Draft<'_>, object: &DriveObject, axes: &'a [FoundAxis]) -> Option<&'a FoundAxis> {
     let (name, file) = (object.name().to_ascii_uppercase(), object.file.to_ascii_uppercase());
     let chosen = draft.options.drives.iter().find(|choice| {
         let theirs = choice.theirs.to_ascii_uppercase();
@@ -57,6 +57,13 @@ fn axis_of<'a>(draft: &Draft<'_>, object: &DriveObject, axes: &'a [FoundAxis]) -
     }
     if draft.options.drives.iter().any(|choice| choice.ours.eq_ignore_ascii_case(&name)) {
         return None;
+    }
+    if let Some(module) = object.module {
+        // MD30110 names the drive of an axis; without it drives have the numbers of their axes.
+        return axes.iter().find(|axis| {
+            let output = draft.listing.number(Scope::Axis, "CTRLOUT_MODULE_NR", &axis.theirs, 0);
+            output.map_or(axis.number, |(number, _)| number as u32) == module
+        });
     }
     let wanted = object.axis.clone().unwrap_or_else(|| bare(&name).to_owned());
     axes.iter().find(|axis| {

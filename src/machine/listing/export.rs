@@ -8,7 +8,7 @@ use super::export_axis::{axis_lines, drive_lines, feedforward_lines};
 use super::import::{ImportOptions, import_listing};
 use super::rows::{ROWS, Row};
 use super::special::PATH_MODES;
-use super::{CARRIED, ListingFile};
+use super::{CARRIED, ListingFile, five_axis};
 use super::{data::Scope, write};
 use crate::base::AxisKind;
 use crate::base::units::s_from_ms;
@@ -66,6 +66,7 @@ pub fn export_listing(loaded: &Loaded) -> String {
         .collect();
     let mut lines = vec!["METRIC".to_owned(), "CHANDATA(1)".to_owned()];
     control(&mut lines, &keys, &axes);
+    five_axis::export(&mut lines, machine);
     for axis in &axes {
         lines.push(format!("; {} is {}", axis.id, axis.ours));
         axis_lines(&mut lines, &keys, axis);

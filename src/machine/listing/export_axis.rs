@@ -119,10 +119,10 @@ fn feedforward(lines: &mut Vec<String>, keys: &Keys, axis: &OutAxis<'_>) {
     // Without the key the feed-forward works with the whole inertia; the control has to be told.
     let whole = keys.number(&axis.key("mechanics.inertia_kg_m2")).filter(|_| torque > 0.0);
     if let Some(inertia) = drive("feedforward_inertia_kg_m2").or(whole) {
-        lines.push(format!("N32650 $MA_AX_INERTIA[{id}]={}", number(inertia * weight)));
+        lines.push(format!("N32650 $MA_AX_INERTIA[{id}]={}", product(inertia, weight)));
     }
     if let Some(mass) = drive("feedforward_mass_kg") {
-        lines.push(format!("N32652 $MA_AX_MASS[{id}]={}", number(mass * weight)));
+        lines.push(format!("N32652 $MA_AX_MASS[{id}]={}", product(mass, weight)));
     }
     if let Some(delay_ms) = drive("setpoint_delay_ms") {
         let (datum, name) = match torque > 0.0 {
@@ -131,6 +131,12 @@ fn feedforward(lines: &mut Vec<String>, keys: &Keys, axis: &OutAxis<'_>) {
         };
         lines.push(format!("N{datum} $MA_{name}[0,{id}]={}", number(s_from_ms(delay_ms))));
     }
+}
+
+/// A product without the digits that only rounding made.
+fn product(value: f64, weight: f64) -> String {
+    let exact = value * weight;
+    number(format!("{exact:.11e}").parse().unwrap_or(exact))
 }
 
 /// MD32610 and what belongs to it, and the pulse of friction compensation.
@@ -142,6 +148,11 @@ pub(super) fn feedforward_lines(lines: &mut Vec<String>, keys: &Keys, axis: &Out
     }
     feedforward(lines, keys, axis);
     pulse(lines, keys, axis);
+    if let Some(row) = ROWS.iter().find(|row| row.number == 32540)
+        && let Some(time_ms) = keys.number(&axis.key(row.key(axis.kind)))
+    {
+        lines.push(assignment(row, &axis.id, row.unit.to_datum(axis.kind, time_ms)));
+    }
 }
 
 fn modes(lines: &mut Vec<String>, keys: &Keys, axis: &OutAxis<'_>) {
@@ -169,6 +180,9 @@ fn pulse(lines: &mut Vec<String>, keys: &Keys, axis: &OutAxis<'_>) {
             "N32520 $MA_FRICT_COMP_CONST_MAX[0,{id}]={}",
             number(Unit::Pulse.to_datum(axis.kind, value))
         ));
+    }
+    if let Some(flag) = keys.flag(&axis.key("drive.friction_adaptation")) {
+        lines.push(format!("N32510 $MA_FRICT_COMP_ADAPT_ENABLE[0,{id}]={}", u8::from(flag)));
     }
 }
 

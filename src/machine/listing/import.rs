@@ -5,7 +5,7 @@
 //! that is not certain; the other machine; a value assumed. Writes no file.
 
 use super::data::{Listing, Spot};
-use super::{ListingFile, axes, drives, lines, scalar, special, write};
+use super::{ListingFile, axes, beyond, drives, five_axis, lines, scalar, special, write};
 use crate::base::Diagnostic;
 use crate::base::diagnostics::SourceText;
 use crate::machine::catalogue::tables;
@@ -68,6 +68,8 @@ pub struct ImportOptions {
     pub base: Option<(String, String)>,
     /// Name of the new machine.
     pub name: Option<String>,
+    /// Its name if nothing else names it: that of the file.
+    pub stand_in: Option<String>,
 }
 
 /// What came of it.
@@ -99,10 +101,6 @@ const SAME_RATIO: f64 = 1e-9;
 /// Imports. Errors: unreadable files, listings in inches, values that make no machine.
 pub fn import_listing(files: &[ListingFile], options: &ImportOptions) -> Result<Imported, Vec<Diagnostic>> {
     let mut listing = lines::read(files)?;
-    if let Some(spot) = &listing.inch {
-        let finding = Diagnostic::error("M0305", "the listing is in inches");
-        return Err(vec![spot.mark(finding, "INCH").help("save it with the metric system (MD10240 = 1)")]);
-    }
     let mut draft = Draft { listing: &mut listing, options, values: BTreeMap::new(), warnings: Vec::new() };
     for (key, (value, spot)) in draft.listing.carried.clone() {
         if key_row(&key).is_none() {
@@ -114,10 +112,11 @@ pub fn import_listing(files: &[ListingFile], options: &ImportOptions) -> Result<
         let source = format!("{}:{}", spot.file, spot.line);
         draft.put(&key, value, Origin::Carried, source);
     }
-    draft.fill()?;
+    let gain_per_s = beyond::units(&mut draft).map_err(|finding| vec![finding])?;
+    draft.fill(gain_per_s)?;
     let Draft { values, mut warnings, .. } = draft;
     let text = write::text(&values);
-    let name = options.name.clone().unwrap_or_else(|| "imported machine".to_owned());
+    let name = options.name.as_ref().or(options.stand_in.as_ref()).map_or("imported machine", String::as_str);
     let loaded = parse(&SourceText::new(format!("{name}.toml"), text.as_str()), &[])?;
     warnings.extend(loaded.warnings.iter().cloned());
     let mut unknown: Vec<Unknown> =
@@ -132,14 +131,16 @@ pub fn import_listing(files: &[ListingFile], options: &ImportOptions) -> Result<
 }
 
 impl Draft<'_> {
-    fn fill(&mut self) -> Result<(), Vec<Diagnostic>> {
+    fn fill(&mut self, gain_per_s: Option<f64>) -> Result<(), Vec<Diagnostic>> {
         let axes = axes::find(self)?;
         scalar::control(self);
         special::control(self, &axes);
         for axis in &axes {
-            scalar::axis(self, axis);
+            scalar::axis(self, axis, gain_per_s);
             special::axis(self, axis);
         }
+        five_axis::import(self, &axes);
+        beyond::axes(self, &axes);
         drives::all(self, &axes);
         special::finish(self, &axes);
         if let Some((name, text)) = &self.options.base {

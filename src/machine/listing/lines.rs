@@ -6,7 +6,7 @@
 
 use super::archive::{is_archive, members};
 use super::data::{Datum, DriveObject, Listing, Literal, Scope, Spot};
-use super::{CARRIED, ListingFile};
+use super::{CARRIED, ListingFile, digital};
 use crate::base::Diagnostic;
 use std::sync::Arc;
 
@@ -67,7 +67,9 @@ fn binary(file: &ListingFile) -> Diagnostic {
 /// Members that may hold machine data; programs and cycles read them and do not set them.
 fn of_interest(name: &str) -> bool {
     let upper = name.to_ascii_uppercase();
-    ["_INI", "_TEA", ".INI", ".TEA", "_TEX", "_ACX", ".ACX", "_TXT"].iter().any(|end| upper.ends_with(end))
+    ["_INI", "_TEA", ".INI", ".TEA", "_TEX", "_ACX", ".ACX", "_TXT", "_TOA", "_BOT"]
+        .iter()
+        .any(|end| upper.ends_with(end))
 }
 
 fn is_text(bytes: &[u8]) -> bool {
@@ -88,6 +90,8 @@ struct Reader {
     errors: Vec<Diagnostic>,
     /// Of `CHANDATA`.
     channel: u32,
+    /// Inside a program of an archive in text form.
+    in_program: bool,
     count: usize,
 }
 
@@ -99,6 +103,7 @@ struct Broken {
 impl Reader {
     fn text(&mut self, name: &str, text: &str) {
         self.channel = 1;
+        self.in_program = false;
         let file: Arc<str> = name.into();
         self.listing.drives.push(DriveObject { file: name.to_owned(), ..DriveObject::default() });
         for (number, line) in text.lines().enumerate() {
@@ -126,7 +131,17 @@ impl Reader {
         if let Some(rest) = line.strip_prefix(CARRIED.trim_end()) {
             return self.carried(rest.trim(), spot);
         }
-        if line.is_empty() || line.starts_with([';', '%']) {
+        if let Some(member) = line.strip_prefix('%') {
+            // An archive in text form: `%_N_MILL_SPF` opens a program, whose assignments are not data.
+            self.in_program =
+                member.starts_with("_N_") && !of_interest(member.split([' ', ';']).next().unwrap_or(member));
+            return Ok(());
+        }
+        if line.is_empty() || line.starts_with(';') || self.in_program {
+            return Ok(());
+        }
+        if line.eq_ignore_ascii_case("METRIC") {
+            self.listing.metric = true;
             return Ok(());
         }
         if line.eq_ignore_ascii_case("INCH") {
@@ -202,9 +217,12 @@ impl Reader {
         };
         let rest = rest.trim_start();
         self.count += 1;
-        let scope = [Scope::General, Scope::Channel, Scope::ChannelSetting, Scope::Axis]
-            .into_iter()
-            .find(|scope| word.starts_with(scope.prefix()));
+        if let Some(name) = word.strip_prefix("$MD_") {
+            return self.drive_datum(name, number, inside, rest, spot);
+        }
+        let all = [Scope::General, Scope::Channel, Scope::ChannelSetting, Scope::Axis];
+        let carrier = word.starts_with("$TC_CARR").then_some(Scope::ToolCarrier);
+        let scope = carrier.or_else(|| all.into_iter().find(|scope| word.starts_with(scope.prefix())));
         let foreign_channel = matches!(scope, Some(Scope::Channel | Scope::ChannelSetting)) && self.channel != 1;
         let Some(scope) = scope.filter(|_| !foreign_channel) else {
             let shown = match foreign_channel {
@@ -217,22 +235,86 @@ impl Reader {
         let value = rest.strip_prefix('=').ok_or(Broken { expected: "expected =" })?;
         let (axis, index) = address(inside, scope)?;
         let name = word[scope.prefix().len()..].to_owned();
-        let datum = Datum { literal: literal(value)?, spot: spot.clone(), used: false };
+        // A tool carrier names axes, `(X)`, which are no numbers.
+        let read = match (literal(value), scope) {
+            (Err(_), Scope::ToolCarrier) => Literal::Text(value.trim().to_owned()),
+            (read, _) => read?,
+        };
+        let datum = Datum { literal: read, spot: spot.clone(), used: false };
         self.listing.add(scope, &name, number, (axis, index), datum);
         Ok(())
     }
 }
 
-/// `0,AX1` or `AX1` or `0`; a second index is folded into the first, so that it is told apart.
+impl Reader {
+    /// `N1407 $MD_SPEEDCTRL_GAIN_1[0,AX1]=5`, of the 840D pl: a parameter of the drive of that axis, or with that number.
+    fn drive_datum(
+        &mut self,
+        name: &str,
+        number: Option<u32>,
+        inside: &str,
+        rest: &str,
+        spot: &Spot,
+    ) -> Result<(), Broken> {
+        let value = rest.strip_prefix('=').ok_or(Broken { expected: "expected =" })?;
+        let parts: Vec<&str> = inside.split(',').map(str::trim).filter(|part| !part.is_empty()).collect();
+        let (index, drive) = match parts.as_slice() {
+            [drive] => ("0", *drive),
+            [index, drive] => (*index, *drive),
+            _ => return Err(Broken { expected: "expected a drive, such as [0,AX1]" }),
+        };
+        let read = match literal(value)? {
+            Literal::Number(value) => digital::counterpart(name, number, value).filter(|_| index == "0"),
+            Literal::Text(_) => None,
+        };
+        let Some((parameter, place, value)) = read else {
+            *self.listing.foreign.entry(format!("$MD_{name}")).or_default() += 1;
+            return Ok(());
+        };
+        let drive = drive.trim_matches('"').to_ascii_uppercase();
+        let digits = drive.trim_start_matches(|c: char| c.is_ascii_alphabetic() || c == '_');
+        let module: Option<u32> = if drive.starts_with("AX") { None } else { digits.parse().ok() };
+        let is_axis = drive.starts_with(|c: char| c.is_ascii_alphabetic()) && !drive.starts_with('D');
+        let file = format!("$MD_ of {drive}");
+        let place_of = self.listing.drives.iter().position(|known| known.file == file);
+        let place_of = place_of.unwrap_or_else(|| {
+            // Before the object that is being read, which is the last.
+            let object = DriveObject {
+                file,
+                axis: is_axis.then_some(drive),
+                module: module.filter(|_| !is_axis),
+                ..DriveObject::default()
+            };
+            self.listing.drives.insert(0, object);
+            0
+        });
+        if let Some(object) = self.listing.drives.get_mut(place_of) {
+            let datum = Datum { literal: Literal::Number(value), spot: spot.clone(), used: false };
+            object.parameters.insert((parameter, place), datum);
+        }
+        Ok(())
+    }
+}
+
+/// `0,AX1` or `AX1` or `0`; a second index is folded into the first, so that it is told apart. An axis may be its number: `[0,1]`, `[1]`.
 fn address(inside: &str, scope: Scope) -> Result<(String, u32), Broken> {
-    let (mut axis, mut index) = (String::new(), 0_u32);
+    let (mut axis, mut index, mut numbers) = (String::new(), 0_u32, Vec::new());
     for part in inside.split(',').map(str::trim).filter(|part| !part.is_empty()) {
         if part.starts_with(|c: char| c.is_ascii_digit()) {
             let given: u32 = part.parse().map_err(|_| Broken { expected: "expected an index" })?;
             index = index.saturating_mul(1000).saturating_add(given);
+            numbers.push(given);
         } else {
             axis = part.trim_matches('"').to_ascii_uppercase();
         }
+    }
+    if scope == Scope::Axis
+        && axis.is_empty()
+        && let Some((last, before)) = numbers.split_last()
+        && *last > 0
+    {
+        let first = before.first().copied().unwrap_or(0);
+        return Ok((format!("AX{last}"), before.iter().skip(1).fold(first, |all, one| all.saturating_mul(1000) + one)));
     }
     if scope == Scope::Axis && axis.is_empty() {
         return Err(Broken { expected: "expected an axis, such as [0,AX1]" });

@@ -4,14 +4,18 @@
 //! ([`archive`]). Out: [`import_listing`] makes the text of a machine file, and says of every key where its value comes from; what is
 //! assumed; which data have no counterpart, once each with their number. [`export_listing`] writes a listing of a machine. A key
 //! without machine datum travels in a comment (`;#sollwert KEY = VALUE`), which a control passes over, so that nothing is lost on the
-//! way out and in again. Compiled drive data (ACX, BOT) are not read, transformations and compensation tables neither.
+//! way out and in again. The five-axis transformation is read and written ([`five_axis`]); compiled drive data (ACX, BOT), compensation
+//! tables and other transformations are not.
 
 mod archive;
 mod axes;
+mod beyond;
 mod data;
+mod digital;
 mod drives;
 mod export;
 mod export_axis;
+mod five_axis;
 mod import;
 mod lines;
 mod rows;

@@ -93,6 +93,10 @@ const fn axis(number: u32, name: &'static str, linear: &'static str, rotary: &'s
     Row { number, name, scope: Scope::Axis, index: 0, plain: true, linear, rotary, unit }
 }
 
+const fn acceleration(number: u32, name: &'static str, linear: &'static str, rotary: &'static str) -> Row {
+    axis(number, name, linear, rotary, Unit::Same)
+}
+
 const fn first(row: Row) -> Row {
     Row { plain: false, ..row }
 }
@@ -131,6 +135,34 @@ pub(super) const ROWS: &[Row] = &[
     axis(36020, "POSITIONING_TIME", "drive.positioning_time_ms", "drive.positioning_time_ms", Unit::Time),
     axis(36030, "STANDSTILL_POS_TOL", "drive.standstill_um", "drive.standstill_deg", Unit::Small),
     axis(36040, "STANDSTILL_DELAY_TIME", "drive.standstill_delay_ms", "drive.standstill_delay_ms", Unit::Time),
+    first(axis(
+        32530,
+        "FRICT_COMP_CONST_MIN",
+        "drive.friction_compensation_min_mm_s",
+        "drive.friction_compensation_min_deg_s",
+        Unit::Pulse,
+    )),
+    first(acceleration(
+        32550,
+        "FRICT_COMP_ACCEL1",
+        "drive.friction_acceleration_1_m_s2",
+        "drive.friction_acceleration_1_rot_s2",
+    )),
+    first(acceleration(
+        32560,
+        "FRICT_COMP_ACCEL2",
+        "drive.friction_acceleration_2_m_s2",
+        "drive.friction_acceleration_2_rot_s2",
+    )),
+    first(acceleration(
+        32570,
+        "FRICT_COMP_ACCEL3",
+        "drive.friction_acceleration_3_m_s2",
+        "drive.friction_acceleration_3_rot_s2",
+    )),
+    axis(36050, "CLAMP_POS_TOL", "drive.clamping_um", "drive.clamping_deg", Unit::Small),
+    first(axis(36220, "CTRLOUT_LIMIT_TIME", "drive.speed_limit_time_ms", "drive.speed_limit_time_ms", Unit::Time)),
+    axis(36610, "AX_EMERGENCY_STOP_TIME", "drive.emergency_stop_time_ms", "drive.emergency_stop_time_ms", Unit::Time),
     axis(36400, "CONTOUR_TOL", "drive.contour_monitoring_um", "drive.contour_monitoring_deg", Unit::Small),
 ];
 

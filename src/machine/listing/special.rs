@@ -16,7 +16,8 @@ use crate::machine::keys::{Absent, Key, MotorKind};
 /// Words of group 10 by their number in MD20150[9].
 pub(super) const PATH_MODES: [&str; 7] = ["G60", "G64", "G641", "G642", "G643", "G644", "G645"];
 /// Words of the jerk filter by MD32402.
-pub(super) const JERK_FILTERS: [&str; 4] = ["second_order", "moving_average", "band_stop", "double_moving_average"];
+pub(super) const JERK_FILTERS: [&str; 5] =
+    ["second_order", "moving_average", "band_stop", "double_moving_average", "fir_low_pass"];
 /// Words of MD20482, hundreds.
 pub(super) const COMPRESSOR_BLOCKS: [&str; 4] = ["lines", "arcs", "rapids", "all"];
 /// A travel limit of this or more is none: the control writes 1e8.
@@ -47,20 +48,11 @@ pub(super) fn control(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
     if !draft.values.contains_key("smoothing.contour_tolerance_mm") {
         least(draft, &linear, "COMPRESS_POS_TOL", "smoothing.contour_tolerance_mm");
     }
-    if let Some((kind, source)) =
-        axes.iter().find_map(|axis| draft.listing.number(Scope::Axis, "FIPO_TYPE", &axis.theirs, 0))
-    {
-        let word = if kind == 1.0 { "linear" } else { "cubic" };
-        draft.put_word("cycle.fine_interpolation", word, Origin::Datum, &source);
-    }
-    if let Some((kind, source)) = draft.listing.number(Scope::Channel, "TRAFO_TYPE_1", &nobody, 0)
-        && kind != 0.0
-        && !draft.values.contains_key("kinematics.type")
-    {
-        let message = format!("{source} = {kind}: a transformation is not taken over, the machine is cartesian");
-        draft
-            .warnings
-            .push(Diagnostic::warning("M0310", message).help("write [kinematics] by hand (docs/machine-file.md)"));
+    let fine: Vec<(f64, String)> =
+        axes.iter().filter_map(|axis| draft.listing.number(Scope::Axis, "FIPO_TYPE", &axis.theirs, 0)).collect();
+    if let Some((kind, source)) = fine.first() {
+        let word = if *kind == 1.0 { "linear" } else { "cubic" };
+        draft.put_word("cycle.fine_interpolation", word, Origin::Datum, source);
     }
     let clock = draft.listing.number(Scope::General, "SYSCLOCK_CYCLE_TIME", &nobody, 0);
     let ratio = draft.listing.number(Scope::General, "IPO_SYSCLOCK_TIME_RATIO", &nobody, 0);
@@ -97,8 +89,18 @@ fn spindle(draft: &mut Draft<'_>) {
         if let Some((value, source)) = acceleration {
             draft.put_number("spindle.acceleration_rot_s2", value, Origin::Datum, &source, None);
         }
-        if let Some((value, source)) = draft.listing.number(Scope::Axis, "SPIND_DES_VELO_TOL", &axis, 0) {
-            draft.put_number("spindle.speed_tolerance", value, Origin::Datum, &source, None);
+        let scalars = [
+            ("SPIND_DES_VELO_TOL", 0, "spindle.speed_tolerance"),
+            ("SPIND_POSCTRL_VELO", 0, "spindle.positioning_speed_rpm"),
+            ("GEAR_STEP_POSCTRL_ACCEL", 1, "spindle.positioning_acceleration_rot_s2"),
+        ];
+        for (name, place, key) in scalars {
+            if let Some((value, source)) = draft.listing.number(Scope::Axis, name, &axis, place) {
+                draft.put_number(key, value, Origin::Datum, &source, None);
+            }
+        }
+        if let Some((flag, source)) = draft.listing.number(Scope::Axis, "SPIND_STOPPED_AT_IPO_START", &axis, 0) {
+            draft.put_flag("spindle.feed_waits_for_stop", flag != 0.0, Origin::Datum, &source);
         }
     }
 }
@@ -222,6 +224,9 @@ fn modes(draft: &mut Draft<'_>, axis: &FoundAxis) {
         let value = if switch == 0.0 { 0.0 } else { Unit::Pulse.to_key(axis.kind, pulse) };
         draft.put_number(&axis.key(&format!("drive.{key}")), value, Origin::Datum, &source, None);
     }
+    if let Some((flag, source)) = draft.listing.number(Scope::Axis, "FRICT_COMP_ADAPT_ENABLE", &axis.theirs, 0) {
+        draft.put_flag(&axis.key("drive.friction_adaptation"), flag != 0.0, Origin::Datum, &source);
+    }
     let nobody = [String::new()];
     let cycle = draft.listing.number(Scope::General, "POSCTRL_CYCLE_TIME", &nobody, 0).or_else(|| {
         let (clock_s, source) = draft.listing.number(Scope::General, "SYSCLOCK_CYCLE_TIME", &nobody, 0)?;
@@ -321,9 +326,10 @@ pub(super) fn finish(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
 /// Values for required keys that nothing gave.
 pub(super) fn assume(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
     draft.put("format", "1".to_owned(), Origin::Datum, "version of the file format".to_owned());
-    let name = draft.options.name.clone().unwrap_or_else(|| "imported machine".to_owned());
+    let options = draft.options;
+    let name = options.name.as_ref().or(options.stand_in.as_ref()).map_or("imported machine", String::as_str);
     let origin = if draft.options.name.is_some() { Origin::Datum } else { Origin::Assumed };
-    draft.put_word("name", &name, origin, "name of the import");
+    draft.put_word("name", name, origin, "name of the import");
     draft.put_word("control", "SINUMERIK", Origin::Assumed, "machine data are those of a SINUMERIK");
     let mut lacking = vec![("cycle.t_cyl_ms".to_owned(), 4.0)];
     for axis in axes {

@@ -35,6 +35,7 @@ function point(time) {
 
 // The run of a strip that holds at a time; -1 before the first.
 function runAt(strip, time) {
+  if (time > strip.end) return -1;
   let low = 0, high = strip.starts.length;
   while (low < high) { const middle = (low + high) >> 1; if (strip.starts[middle] <= time) low = middle + 1; else high = middle; }
   return low - 1;

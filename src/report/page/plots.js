@@ -76,7 +76,7 @@ function columns(curve, times, width) {
 
 function makePlot(plot) {
   const panel = element("div", "panel plot"), bar = element("div", "bar"), area = element("div"), legend = element("div", "legend");
-  bar.append(element("b", "", plot.title), element("span", "unit", plot.unit));
+  bar.append(element("b", "", plot.title), element("span", "unit", pretty(plot.unit)));
   panel.append(bar, area, legend);
   $("plots").append(panel);
   const curves = plot.curves.map(openCurve);
@@ -118,7 +118,7 @@ function makePlot(plot) {
     const options = {
       width: Math.max(panel.clientWidth - 2, 100), height, series, bands, legend: { show: false }, padding: [8, 14, 0, 0],
       scales: { x: { time: false, range: () => [state.from, state.to] }, y: { range: (u, low, high) => pad(low, high) } },
-      axes: [{ ...axis, size: 28, values: (u, ticks) => ticks.map((t) => String(+t.toFixed(9))) }, { ...axis, size: 62, values: (u, ticks) => ticks.map(short) }],
+      axes: [{ ...axis, size: 28, values: (u, ticks) => ticks.map((t, i) => String(+t.toFixed(9)) + (i === ticks.length - 1 ? " s" : "")) }, { ...axis, size: 62, values: (u, ticks) => ticks.map(short) }],
       cursor: { y: false, points: { show: false }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => { show(data.start, data.end); return null; } } },
       hooks: {
         setCursor: [(u) => { if (inside) point(u.cursor.left >= 0 ? u.posToVal(u.cursor.left, "x") : null); }],
@@ -167,6 +167,9 @@ function pad(low, high) {
   const margin = (high - low) * 0.06 || Math.abs(high) * 0.01 || 1e-6;
   return [low - margin, high + margin];
 }
+
+// Units as they are printed: mm/s².
+function pretty(unit) { return unit.replace("^2", "²").replace("^3", "³"); }
 
 function short(value) {
   if (value === 0) return "0";

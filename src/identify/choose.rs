@@ -1,0 +1,326 @@
+//! Time along the path: words, look-ahead window and numbers together.
+//!
+//! In: a [`Fit`] whose shape is done. Out: the same with the words, the window and the numbers that leave the least over; which words and windows the
+//! motion tells. A word is tried with the numbers fitted to it, one word at a time, round after round until none helps; the window is searched
+//! over whole numbers between the fits. If much is left over, the fit begins again from other numbers.
+
+use super::knobs::{Knob, Switch};
+use super::search::{Aim, Fit};
+use crate::base::AxisId;
+use crate::base::units::percent_from_ratio;
+use crate::machine::{CornerRule, Machine};
+
+/// Passes of a fit while words are compared, and of a fit.
+const PASSES: (usize, usize) = (3, 25);
+/// Rounds over all words.
+const ROUNDS: usize = 4;
+/// RMS of ln(feed) that is as good as none: where no word need be tried, and where a fit ends; and that from which other starts are tried.
+const LITTLE_LEFT: f64 = 4e-3;
+const NONE_LEFT: f64 = 5e-4;
+const MUCH_LEFT: f64 = 0.01;
+/// Another word must leave less than this share of the cost over.
+const BETTER_SHARE: f64 = 0.8;
+/// RMS of ln(feed) from which two words drive differently.
+const DIFFERS: f64 = 1e-3;
+/// Windows that are tried first.
+const WINDOWS: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 1000];
+/// Windows between two of those that are tried at once.
+const BETWEEN: usize = 4;
+/// Other numbers to begin from: radial shares of acceleration and jerk, factors on transition jerk and jerk.
+const STARTS: [[f64; 4]; 6] = [
+    [0.5, 0.5, 1.0, 1.0],
+    [0.5, 0.5, 2.5, 2.5],
+    [0.3, 0.3, 0.4, 0.4],
+    [0.7, 0.3, 1.0, 2.5],
+    [0.2, 0.7, 2.5, 0.6],
+    [0.5, 0.15, 3.0, 1.0],
+];
+
+/// What the motion tells about the window.
+pub(super) enum Window {
+    /// From, to.
+    Between(usize, usize),
+    /// This many and more move the same.
+    AtLeast(usize),
+}
+
+/// The search in progress.
+pub(super) struct Search<'a, 'b> {
+    pub(super) fit: Fit<'a>,
+    cost: f64,
+    /// Axes that the programs move.
+    axes: Vec<AxisId>,
+    progress: &'b mut dyn FnMut(&str),
+}
+
+impl<'a, 'b> Search<'a, 'b> {
+    /// `None` where the machine as it is ends in an alarm.
+    pub(super) fn new(fit: Fit<'a>, axes: Vec<AxisId>, progress: &'b mut dyn FnMut(&str)) -> Option<Self> {
+        let mut search = Self { fit, cost: f64::INFINITY, axes, progress };
+        search.cost = search.fit.cost(Aim::Both)?;
+        Some(search)
+    }
+
+    /// Knobs under the words of `machine`: of time with one jerk for all axes, or those of the shape too and a jerk for each axis. The path of
+    /// set-points a cycle apart is a polyline that depends on the feed: what the shape is worth is known when the feed is.
+    fn knobs_of(&self, machine: &Machine, per_axis: bool) -> Vec<Knob> {
+        let step = match machine.feed.corner_rule {
+            CornerRule::FollowUp => Knob::FollowUp,
+            CornerRule::Overload => Knob::Overload,
+        };
+        let mut knobs = if per_axis { Knob::SHAPE.to_vec() } else { Vec::new() };
+        knobs.extend([Knob::RadialAcceleration, Knob::RadialJerk]);
+        if per_axis {
+            knobs.extend(self.axes.iter().map(|id| Knob::TransitionJerk(Some(*id))));
+            knobs.extend(self.axes.iter().map(|id| Knob::Jerk(Some(*id))));
+        } else {
+            knobs.extend([Knob::TransitionJerk(None), Knob::Jerk(None)]);
+        }
+        knobs.push(step);
+        knobs
+    }
+
+    /// Knobs that the result rests on.
+    pub(super) fn knobs(&self) -> Vec<Knob> {
+        self.knobs_of(&self.fit.machine, true)
+    }
+
+    /// The whole search.
+    pub(super) fn run(&mut self) {
+        self.time_law();
+        self.fitted();
+        self.rounds();
+        if self.left() > MUCH_LEFT {
+            self.begin_elsewhere();
+        }
+    }
+
+    /// The time law that comes nearest after a few passes from the numbers of the file: numbers fitted to the wrong one are no place to begin from.
+    fn time_law(&mut self) {
+        self.say("time along the path");
+        let mut machines = vec![self.fit.machine.clone()];
+        machines.extend(Switch::TimeLaw.others(&self.fit.machine));
+        let start = self.fit.clone();
+        for machine in machines {
+            if self.done() {
+                return;
+            }
+            self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&machine)));
+            let knobs = self.knobs_of(&machine, false);
+            let mut trial = Fit { machine, plans: self.fit.plans, ..start.clone() };
+            let cost = trial.run(&knobs, Aim::Both, 2 * PASSES.0, NONE_LEFT * NONE_LEFT);
+            self.fit.plans = trial.plans;
+            if let Some(cost) = cost.filter(|cost| *cost < self.cost) {
+                (self.fit, self.cost) = (trial, cost);
+            }
+        }
+    }
+
+    /// RMS of ln(feed) that is left over.
+    fn left(&self) -> f64 {
+        self.cost.sqrt()
+    }
+
+    fn done(&self) -> bool {
+        self.left() <= LITTLE_LEFT
+    }
+
+    fn say(&mut self, what: &str) {
+        let percent = percent_from_ratio(self.left());
+        (self.progress)(&format!("{what} ({percent:.2} % is left over)"));
+    }
+
+    fn refine(&mut self, per_axis: bool) {
+        let knobs = self.knobs_of(&self.fit.machine, per_axis);
+        if let Some(cost) = self.fit.run(&knobs, Aim::Both, PASSES.1, NONE_LEFT * NONE_LEFT) {
+            self.cost = cost;
+        }
+    }
+
+    /// Numbers and window under the present words, to the end.
+    fn fitted(&mut self) {
+        self.say("time along the path");
+        self.refine(false);
+        self.window();
+        if self.left() > NONE_LEFT {
+            self.say("time along the path, axis by axis");
+            self.refine(true);
+            if self.window() {
+                self.refine(true);
+            }
+        }
+    }
+
+    /// Words: in each round all of them are tried, and the best is taken, until none helps.
+    fn rounds(&mut self) {
+        for _ in 0..ROUNDS {
+            if self.done() || !self.round() {
+                return;
+            }
+        }
+    }
+
+    fn round(&mut self) -> bool {
+        let others: Vec<(Switch, Machine)> = Switch::TIME
+            .into_iter()
+            .flat_map(|switch| switch.others(&self.fit.machine).into_iter().map(move |other| (switch, other)))
+            .collect();
+        let machines: Vec<Machine> = others.iter().map(|(_, machine)| machine.clone()).collect();
+        let differences = self.fit.differences(&machines, Aim::Both);
+        let mut best: Option<(f64, Fit<'a>)> = None;
+        for ((switch, other), difference) in others.into_iter().zip(differences) {
+            // What moves less than is left over explains none of it.
+            if difference.is_none_or(|square| square < 0.1 * self.cost) {
+                continue;
+            }
+            self.say(&format!("{} {}", switch.key(), switch.word(&other)));
+            let knobs = self.knobs_of(&other, false);
+            let mut trial = Fit { machine: other, ..self.fit.clone() };
+            trial.values.retain(|(knob, _)| !matches!(knob, Knob::FollowUp | Knob::Overload) || knobs.contains(knob));
+            let mut afresh = trial.clone();
+            afresh.values.retain(|(knob, _)| knob.is_of_shape());
+            let [present, file] =
+                [trial.cost(Aim::Both), afresh.cost(Aim::Both)].map(|cost| cost.unwrap_or(f64::INFINITY));
+            if file < present {
+                trial.values = afresh.values;
+            }
+            let cost = trial.run(&knobs, Aim::Both, PASSES.0, NONE_LEFT * NONE_LEFT);
+            self.fit.plans = trial.plans;
+            if let Some(cost) = cost
+                && best.as_ref().is_none_or(|(least, _)| cost < *least)
+            {
+                best = Some((cost, trial));
+            }
+        }
+        let Some((cost, trial)) = best else { return false };
+        let plans = self.fit.plans;
+        let before = (std::mem::replace(&mut self.fit, trial), std::mem::replace(&mut self.cost, cost));
+        self.fit.plans = plans;
+        self.fitted();
+        if self.cost < BETTER_SHARE * before.1 {
+            return true;
+        }
+        let plans = self.fit.plans;
+        (self.fit, self.cost) = before;
+        self.fit.plans = plans;
+        false
+    }
+
+    /// The least that fits begun from other numbers leave over.
+    fn begin_elsewhere(&mut self) {
+        let mut best: Option<(f64, Fit<'a>)> = None;
+        for (place, [acceleration, jerk, transition, plain]) in STARTS.into_iter().enumerate() {
+            self.say(&format!("start {} of {}", place + 2, STARTS.len() + 1));
+            let mut trial = self.fit.clone();
+            trial.values.retain(|(knob, _)| knob.is_of_shape());
+            trial.values.extend([
+                (Knob::RadialAcceleration, acceleration),
+                (Knob::RadialJerk, jerk),
+                (Knob::TransitionJerk(None), transition),
+                (Knob::Jerk(None), plain),
+            ]);
+            let knobs = self.knobs_of(&self.fit.machine, false);
+            let cost = trial.run(&knobs, Aim::Both, 2 * PASSES.0, NONE_LEFT * NONE_LEFT);
+            self.fit.plans = trial.plans;
+            if let Some(cost) = cost
+                && best.as_ref().is_none_or(|(least, _)| cost < *least)
+            {
+                best = Some((cost, trial));
+            }
+        }
+        let Some((cost, trial)) = best else { return };
+        let plans = self.fit.plans;
+        let before = (std::mem::replace(&mut self.fit, trial), std::mem::replace(&mut self.cost, cost));
+        self.fit.plans = plans;
+        self.fitted();
+        self.rounds();
+        if self.cost >= before.1 {
+            let plans = self.fit.plans;
+            (self.fit, self.cost) = before;
+            self.fit.plans = plans;
+        }
+    }
+
+    /// Costs of some windows at the present numbers.
+    fn costs(&mut self, windows: &[usize]) -> Vec<(usize, f64)> {
+        let with = |blocks: &usize| Machine { look_ahead_blocks: *blocks, ..self.fit.machine.clone() };
+        let machines: Vec<Machine> = windows.iter().map(with).collect();
+        let costs = self.fit.costs(&machines, Aim::Both);
+        windows.iter().copied().zip(costs).filter_map(|(blocks, cost)| Some((blocks, cost?))).collect()
+    }
+
+    /// Costs of the usual windows and of all of those around the best one, in order.
+    fn window_costs(&mut self) -> Vec<(usize, f64)> {
+        let mut windows = WINDOWS.to_vec();
+        windows.push(self.fit.machine.look_ahead_blocks);
+        windows.sort_unstable();
+        windows.dedup();
+        let mut costs = self.costs(&windows);
+        loop {
+            let Some(best) = least(&costs) else { return costs };
+            let below = best.checked_sub(1).map_or(costs[best].0, |k| costs[k].0);
+            let above = costs.get(best + 1).map_or(costs[best].0, |next| next.0);
+            let inside: Vec<usize> = (below + 1..above).filter(|blocks| *blocks != costs[best].0).collect();
+            if inside.is_empty() {
+                return costs;
+            }
+            let stride = inside.len().div_ceil(BETWEEN);
+            let more: Vec<usize> = inside.into_iter().step_by(stride).collect();
+            costs.extend(self.costs(&more));
+            costs.sort_by_key(|(blocks, _)| *blocks);
+        }
+    }
+
+    /// Takes the window that leaves the least over, and fits again; that of the file stays where it is as good.
+    fn window(&mut self) -> bool {
+        if self.left() <= NONE_LEFT {
+            return false;
+        }
+        self.say("look-ahead window");
+        let costs = self.window_costs();
+        let Some((blocks, cost)) = least(&costs).map(|best| costs[best]) else { return false };
+        let now = costs.iter().find(|(blocks, _)| *blocks == self.fit.machine.look_ahead_blocks);
+        let takes = now.is_none_or(|(_, now)| cost < 0.999 * now);
+        if takes {
+            self.fit.machine.look_ahead_blocks = blocks;
+            self.cost = cost;
+            self.refine(false);
+        }
+        takes
+    }
+
+    /// Windows that move as the present one does.
+    pub(super) fn told_window(&mut self) -> Window {
+        let now = self.fit.machine.look_ahead_blocks;
+        let most = WINDOWS[WINDOWS.len() - 1].max(2 * now);
+        let limit = 1.05 * self.cost + DIFFERS * DIFFERS;
+        let mut tried = vec![most, now + 1];
+        tried.extend((1..now).rev().take(1).chain(WINDOWS.into_iter().rev().filter(|blocks| blocks + 1 < now)));
+        let costs = self.costs(&tried);
+        let of =
+            |blocks: usize| costs.iter().find(|(tried, _)| *tried == blocks).is_some_and(|(_, cost)| *cost < limit);
+        let below = tried[2..].iter().take_while(|blocks| of(**blocks)).last();
+        let low = below.copied().unwrap_or(now);
+        match (of(most), of(now + 1)) {
+            (true, _) => Window::AtLeast(low),
+            (false, true) => Window::Between(low, now + 1),
+            (false, false) => Window::Between(low, now),
+        }
+    }
+
+    /// Which switches are told: the other words all drive differently.
+    pub(super) fn told(&mut self) -> Vec<(Switch, bool)> {
+        let limit = (DIFFERS * DIFFERS).max(self.cost);
+        let mut told = Vec::new();
+        for switch in Switch::TIME {
+            let differences = self.fit.differences(&switch.others(&self.fit.machine), Aim::Both);
+            told.push((switch, differences.iter().all(|square| square.is_none_or(|square| square > limit))));
+        }
+        told
+    }
+}
+
+/// Place of the least cost; the smallest window of equal ones.
+fn least(costs: &[(usize, f64)]) -> Option<usize> {
+    (0..costs.len()).min_by(|a, b| costs[*a].1.total_cmp(&costs[*b].1).then(a.cmp(b)))
+}
