@@ -236,7 +236,7 @@ impl Tangent {
         };
         let step_s = (STEP_SHARE * phase_s).max(RAMP_STEP_MIN_S);
         let worth = change_lu_s > RAMP_MIN_SHARE * to_lu_s && step_s < self.step_s;
-        worth.then(|| Ramp { way_lu: (from_lu_s + to_lu_s) * phase_s, step_s })
+        worth.then_some(Ramp { way_lu: (from_lu_s + to_lu_s) * phase_s, step_s })
     }
 
     /// The way from a speed to a stop.
