@@ -401,7 +401,8 @@ fn a_machine_that_asks_for_what_cannot_be_run_is_refused_by_the_library_too() {
 
 #[test]
 fn a_change_of_the_override_is_the_same_on_any_number_of_threads_and_on_record() {
-    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous"]);
+    // Without the wait for the spindle, or nothing moves yet when the override changes.
+    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous", "spindle.feed_starts_at_once=true"]);
     let mut recordings = Vec::new();
     for threads in [1, 2, 2] {
         let path = scratch(&format!("override_{threads}.mcap"));

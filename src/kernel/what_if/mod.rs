@@ -11,8 +11,8 @@ mod datum;
 mod places;
 
 use super::preparation::{PieceSource, Preparation};
-use crate::feed::Planner;
-use crate::interpreter::{Move, MoveKind, Setup};
+use crate::feed::{PlannedPiece, Planner};
+use crate::interpreter::{Event, Move, MoveKind, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
 use crate::smoothing::{ContourPiece, Smoother};
@@ -79,6 +79,8 @@ struct Run<'a> {
     bindings: Vec<Binding>,
     cut_short: bool,
     planned_again: usize,
+    /// The move with which the spindle was told another speed last.
+    commanded: Option<usize>,
 }
 
 /// Ranks the data of `machine` for a program. `progress` hears how many of how many data are done.
@@ -114,6 +116,7 @@ impl<'a> Run<'a> {
             bindings: Vec::new(),
             cut_short: false,
             planned_again: 0,
+            commanded: None,
         };
         let mut times_s: Vec<f64> = Vec::new();
         let mut at = 0;
@@ -130,9 +133,15 @@ impl<'a> Run<'a> {
             }
             times_s.resize(times_s.len().max(at + 1), 0.0);
             run.timing.rests_after.resize(times_s.len(), false);
+            if contour.curve().is_none() {
+                run.stand(&piece, at);
+                continue;
+            }
             times_s[at] += piece.law.duration_s();
-            run.timing.rests_after[at] |=
-                contour.stop_at_end || contour.curve().is_none() && piece.law.duration_s() > 0.0;
+            run.timing.rests_after[at] |= contour.stop_at_end;
+            if contour.events.iter().any(commands_spindle) {
+                run.commanded = Some(at);
+            }
             for datum in beside(machine, &piece) {
                 bind(&mut run.bindings, datum, at, 0.0);
             }
@@ -152,6 +161,26 @@ impl<'a> Run<'a> {
             }))
             .collect();
         run
+    }
+
+    /// The path stands: no datum of an axis makes that shorter, and it is no part of the time that is compared.
+    fn stand(&mut self, piece: &PlannedPiece, at: usize) {
+        if piece.law.duration_s() <= 0.0 {
+            return;
+        }
+        let moves = !matches!(self.moves[at].kind, MoveKind::Function { .. } | MoveKind::Dwell { .. });
+        if !moves {
+            self.timing.rests_after[at] = true;
+            return;
+        }
+        // A feed that waits for its spindle waits before its move: what is saved since the spindle was told is waited for here.
+        if let Some(before) = at.checked_sub(1) {
+            self.timing.rests_after[before] = true;
+        }
+        let commanded = self.commanded.take().unwrap_or(at);
+        for binding in &mut self.bindings {
+            binding.moves.retain(|(index, _)| *index < commanded || *index >= at);
+        }
     }
 
     fn saving(&mut self, binding: &Binding) -> Saving {
@@ -215,7 +244,8 @@ impl<'a> Run<'a> {
         }
         let take = |planner: &mut Planner, time_s: &mut f64| {
             while let Some(piece) = planner.pop() {
-                if (counted[0]..=counted[1]).contains(&piece.path.contour.block.number) {
+                let contour = &piece.path.contour;
+                if contour.curve().is_some() && (counted[0]..=counted[1]).contains(&contour.block.number) {
                     *time_s += piece.law.duration_s();
                 }
             }
@@ -251,6 +281,10 @@ impl<'a> Run<'a> {
         lines.truncate(LINES_MAX);
         lines
     }
+}
+
+fn commands_spindle(event: &Event) -> bool {
+    matches!(event, Event::SpindleSpeed { .. } | Event::MFunction(3 | 4))
 }
 
 fn bind(bindings: &mut Vec<Binding>, datum: Datum, index: usize, time_s: f64) {
