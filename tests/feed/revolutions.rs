@@ -105,7 +105,7 @@ fn a_feed_that_starts_at_once_takes_the_turns_of_the_spindle() {
             let wanted_s = 2.5 / 2.0 + 20.0 / 0.2 / 50.0;
             assert!((end_s - wanted_s).abs() < 0.1, "{law}: {end_s}, {wanted_s}");
             // `continuous` falls behind for some set-points where a plan ends in a stop that is not the program's.
-            let behind_share = if law == "continuous" { 0.15 } else { 0.06 };
+            let behind_share = if law == "continuous" { 0.15 } else { 0.07 };
             for (t, lead_mm) in leads(&rows, 2..=81, [0.3, 0.1]) {
                 assert!((lead_mm / 0.2 - 1.0).abs() < behind_share, "{law}: {t} s: {lead_mm}");
             }
