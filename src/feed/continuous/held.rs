@@ -126,7 +126,10 @@ fn used_inside(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>) 
         let misses = |place: &usize| missed(chain, profile, index, *place, [&states[*place], &between[*place]]);
         if [1, 3, 5, 7].iter().map(misses).any(|ratio| ratio > MISSED_MAX_RATIO || ratio.is_nan()) {
             // A curve that turns within a part of the interval may have its peak between the eighths.
-            let place = |i: usize| look(index, interval.start_lu + i as f64 / 64.0 * interval.length_lu());
+            let place = |i: usize| {
+                let share = i as f64 / (PLACES_MAX - 1) as f64;
+                look(index, interval.start_lu + share * interval.length_lu())
+            };
             let states: [Derivatives; PLACES_MAX] = std::array::from_fn(place);
             return most_used(interval, profile, chain, index, &states);
         }

@@ -17,6 +17,7 @@ pub(super) const STEP_SHARE: f64 = 0.25;
 const STEP_MIN_S: f64 = 5e-4;
 pub(super) const STEP_MAX_S: f64 = 0.02;
 
+/// An interval in a short ramp takes this long at least.
 const RAMP_STEP_MIN_S: f64 = 5e-5;
 
 /// A ramp whose speed grows by less than this share is not worth finer intervals.
@@ -225,8 +226,8 @@ impl Tangent {
         by_acceleration.min(by_jerk)
     }
 
-    /// A change between two speeds that is over before the greatest acceleration is reached, or before an interval of the usual time is: how far it
-    /// goes, and the time of its intervals.
+    /// A rise of the speed whose intervals must be shorter than the usual ones; its duration is that of two phases of constant jerk, or of one of constant
+    /// acceleration. `None`: it is slow enough, or not worth it.
     pub fn short_ramp(&self, from_lu_s: f64, to_lu_s: f64) -> Option<Ramp> {
         let change_lu_s = to_lu_s - from_lu_s;
         let phase_s = if self.jerk_limited {

@@ -1,8 +1,8 @@
 //! Drive data of the 840D pl (SIMODRIVE 611D, `$MD_`) as the parameters of SINAMICS that mean the same.
 //!
 //! In: name of a datum and its value. Out: parameter, index, value in its unit. Cycles count in 31.25 µs, the integrator time of the current
-//! controller is in µs, all other units agree. Numbers, names and units are those of the manual of the drive functions; no archive of such
-//! a control was at hand, and boot files (BOT), which are compiled, are not read. Band-stops (MD1210 ff.) and speed filters are left out.
+//! controller is in µs, all other units agree. Only MD1407 and MD1409 were seen in a source;
+//! the other numbers, names and units are from memory and unverified: no archive of such a control was at hand. Boot files (BOT), which are compiled, are not read. Band-stops (MD1210 ff.) and speed filters are left out.
 
 use crate::base::units::{MS_PER_S, US_PER_S};
 
