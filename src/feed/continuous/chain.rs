@@ -16,7 +16,7 @@
 
 use super::estimate::{Pace, bend_cap, ray_cap, ray_exponent};
 use super::held::{slowed, tighten};
-use super::interior_point::{Outcome, Problem, Solver};
+use super::interior_point::{Label, Outcome, Problem, Solver};
 use super::interval::{Derivatives, Interval};
 use super::rows::{NodeRows, Range, Scale};
 use crate::feed::Limit;
@@ -72,8 +72,8 @@ const ROUNDS_MAX: u32 = 8;
 /// Where b is by no more than this away from its estimate the tangent is good enough: it misses 3/8 of the square of it.
 const STRAY_MAX_SHARE: f64 = 0.12;
 
-/// Share of a chain, from its start, in which tangents must fit, if the chain does not end where the path rests.
-const NEAR_SHARE: f64 = 0.6;
+/// Of a plan that ends in a stop which is not the program's, the last part is not kept: this many times the way from its last summit.
+const DISTURBED_RATIO: f64 = 1.6;
 
 /// Attempts with tighter limits where those between the places do not hold.
 const ATTEMPTS_MAX: u32 = 8;
@@ -100,9 +100,44 @@ pub(super) struct Planning {
     pub hurries: bool,
     /// The path rests at the end of the chain: no later plan will do it better.
     pub is_last: bool,
+    /// So many intervals will be handed out before the next plan, whatever this one is.
+    pub handed_out: usize,
+    solved: bool,
     /// b̂ at the borders.
     estimate: Vec<f64>,
     caps: Vec<f64>,
+}
+
+impl Profile {
+    /// The last border that is faster than the one before it.
+    pub fn summit(&self) -> usize {
+        let speed = |index: usize| self.points[index].speed_squared_lu2_s2;
+        (1..self.points.len()).rev().find(|index| speed(index - 1) < speed(*index)).unwrap_or(0)
+    }
+
+    /// How many intervals of a plan that ends in a stop in the middle of the path stay.
+    pub fn kept(&self, chain: &Chain) -> usize {
+        let length_lu =
+            |range: std::ops::Range<usize>| chain.intervals[range].iter().map(Interval::length_lu).sum::<f64>();
+        let count = chain.intervals.len();
+        let kept_lu = length_lu(0..count) - DISTURBED_RATIO * length_lu(self.summit().min(count)..count);
+        let mut way_lu = 0.0;
+        let ends = chain.intervals.iter().map(|interval| {
+            way_lu += interval.length_lu();
+            way_lu
+        });
+        ends.take_while(|end_lu| *end_lu <= kept_lu).count()
+    }
+}
+
+/// What the limits of an interval cost, of the time, after a plan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prices {
+    /// If the jerk were used all along (`interior_point`).
+    pub unused: f64,
+    /// If acceleration and jerk were wider by 1, and the square of the speed at its ends.
+    pub limits: f64,
+    pub cap: f64,
 }
 
 impl Chain {
@@ -123,12 +158,13 @@ impl Planning {
         let mut attempts = 0;
         let mut before = None;
         for round in 0.. {
-            if !self.solve(chain, start, &range) {
+            self.solved = self.solve(chain, start, &range);
+            if !self.solved {
                 // A profile of earlier tangents obeys the true limits too: it is only slower.
                 return before.filter(|profile| tighten(chain, profile, &range, look));
             }
             let profile = self.profile(chain, start);
-            if round + 1 < ROUNDS_MAX && self.strays(&profile, &range) {
+            if round + 1 < ROUNDS_MAX && self.strays(chain, &profile, &range) {
                 self.take_estimate(&profile, &range);
                 before = Some(profile);
                 continue;
@@ -145,6 +181,16 @@ impl Planning {
             before = None;
         }
         None
+    }
+
+    /// Of the interval after a node of the last plan; `None` if that was not the solution of its last problem.
+    pub fn prices(&self, node: usize) -> Option<Prices> {
+        let is_cap = |label| label == Label::Cap;
+        self.solved.then(|| Prices {
+            unused: self.problem.unused_ratio(node),
+            limits: self.problem.price_ratio(node, |label| !is_cap(label)),
+            cap: self.problem.price_ratio(node, is_cap) + self.problem.price_ratio(node + 1, is_cap),
+        })
     }
 
     /// Caps and first estimates; false where a number is none.
@@ -208,15 +254,19 @@ impl Planning {
     }
 
     /// Anywhere the solution is far from where the tangents were laid.
-    fn strays(&self, profile: &Profile, range: &std::ops::Range<usize>) -> bool {
+    fn strays(&self, chain: &Chain, profile: &Profile, range: &std::ops::Range<usize>) -> bool {
         let points = &profile.points[range.start..=range.end];
         let far = |(estimate, point): (&f64, &PathPoint)| {
             (point.speed_squared_lu2_s2 / estimate - 1.0).abs() > STRAY_MAX_SHARE
         };
         // What lies far ahead is planned again, with this solution for an estimate.
-        let share = if self.is_last { 1.0 } else { NEAR_SHARE };
-        let near = (share * points.len() as f64).ceil() as usize;
+        let near = (self.near(chain, profile) + 1).saturating_sub(range.start);
         self.estimate.iter().zip(points).take(near).any(far)
+    }
+
+    /// Intervals from the start of a plan that will be gone along as it says: the others are planned again.
+    pub fn near(&self, chain: &Chain, profile: &Profile) -> usize {
+        if self.is_last { chain.intervals.len() } else { profile.kept(chain).max(self.handed_out) }
     }
 
     /// The linear problem around the estimate.

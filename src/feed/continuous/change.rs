@@ -232,7 +232,8 @@ impl Continuous {
             None => vec![Vec::new(), self.hints(&layout.chain).0],
             Some(longer) => vec![longer.shortened(&layout.chain, way_lu)],
         };
-        self.planning.hurries = true;
+        // It ends at rest, and is gone along to its end.
+        (self.planning.hurries, self.planning.is_last) = (true, true);
         let profile = {
             let look = look(pieces, &layout.owners);
             hints.iter().find_map(|hints| self.planning.plan(&mut layout.chain, start, hints, &look))

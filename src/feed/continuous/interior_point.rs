@@ -19,6 +19,7 @@ struct Row {
     bound: f64,
     /// Never gives way.
     holds: bool,
+    label: Label,
     slack: f64,
     multiplier: f64,
     /// 1/slack, 1/multiplier and multiplier/slack at the present point.
@@ -29,6 +30,17 @@ struct Row {
     slack_step: f64,
     multiplier_step: f64,
     correction: f64,
+}
+
+/// What a limit belongs to; a label of the caller's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Label {
+    /// One of the places of an interval at which its control is held.
+    Place(u8),
+    /// Of the state.
+    State,
+    /// The highest of the first component of the state.
+    Cap,
 }
 
 /// From the state at the start of an interval to that at its end: `x+ = A x + B u`.
@@ -65,11 +77,12 @@ impl Problem {
     }
 
     /// A limit of the node at hand and the interval after it.
-    pub fn limit(&mut self, a_ratio: [f64; 3], bound_ratio: f64) {
+    pub fn limit(&mut self, label: Label, a_ratio: [f64; 3], bound_ratio: f64) {
         self.rows.push(Row {
             a: a_ratio,
             bound: bound_ratio,
             holds: false,
+            label,
             slack: 0.0,
             multiplier: 0.0,
             inverse: 0.0,
@@ -107,6 +120,32 @@ impl Problem {
     /// The limits of the node at hand are complete.
     pub fn end_node(&mut self) {
         self.ends.push(self.rows.len());
+    }
+
+    fn rows_of(&self, node: usize) -> &[Row] {
+        let start = node.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.rows[start..self.ends[node]]
+    }
+
+    /// Sum of the multipliers of a node with this label, after a solution: by how much the cost falls if those limits become wider by 1.
+    pub fn price_ratio(&self, node: usize, label: impl Fn(Label) -> bool) -> f64 {
+        self.rows_of(node).iter().filter(|row| label(row.label)).map(|row| row.multiplier).sum()
+    }
+
+    /// By how much the cost would fall, about, if the control after a node could be another one at each of the three places that hold it: to first
+    /// order, with what each place leaves unused, and no more than all of the limit.
+    pub fn unused_ratio(&self, node: usize) -> f64 {
+        let held = || self.rows_of(node).iter().filter(|row| matches!(row.label, Label::Place(_)));
+        let price: f64 = held().map(|row| row.multiplier * row.a[2]).sum();
+        let most = held().filter(|row| row.multiplier > 0.0).map(|row| row.a[2].abs()).fold(0.0, f64::max);
+        if most == 0.0 {
+            return 0.0;
+        }
+        let free = |place: u8| {
+            let rows = held().filter(|row| row.label == Label::Place(place) && row.a[2] * price > 0.0);
+            rows.map(|row| row.slack / row.a[2].abs()).fold(1.0 / most, f64::min)
+        };
+        price.abs() * (0.25 * free(0) + 0.5 * free(1) + 0.25 * free(2))
     }
 }
 

@@ -132,6 +132,21 @@ impl Interval {
         ]
     }
 
+    /// The share that planning begins with.
+    pub fn base_reserve_ratio(&self) -> f64 {
+        if self.straight { LINE_RESERVE_RATIO } else { CURVE_RESERVE_RATIO }
+    }
+
+    /// A part of it, with the limits that it has by itself.
+    pub fn part_by_itself(&self, rules: &AxisRules, path: &JointPath, start_lu: f64, end_lu: f64) -> Self {
+        let part = self.part(path, start_lu, end_lu);
+        Self {
+            cap: cap(rules, path, &[&part.states[0], &part.states[1], &part.states[2]]),
+            reserve_ratio: self.base_reserve_ratio(),
+            ..part
+        }
+    }
+
     /// Planning uses less of its limits from now on.
     pub fn tighten(&mut self, ratio: f64) {
         self.reserve_ratio *= ratio;

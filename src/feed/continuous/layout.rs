@@ -14,6 +14,17 @@ use std::ops::Range;
 /// Where a plan begins or ends at rest in the middle of a path, its first and last interval are cut like this.
 const CUTS_RATIO: [f64; 5] = [0.0, 0.08, 0.2, 0.5, 1.0];
 
+/// One piece of so many is handed out at least before the next plan.
+const STALE_PIECES: usize = 20;
+
+/// Intervals of a plan that are handed out before the next one in any case. Where all of a plan brakes, planning again for each piece would cost more
+/// than a window that is a little shorter. The front is handed out always, and with it all that share its interval: a plan begins where an
+/// interval does.
+pub(super) fn handed_out(places: &VecDeque<Place>) -> usize {
+    let stale = (places.len() / STALE_PIECES).saturating_sub(1);
+    places.get(stale).map_or(0, |place| place.intervals.end)
+}
+
 /// Where a piece is in a chain.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
@@ -126,26 +137,29 @@ impl Layout {
         self.uncut += usize::from(self.uncut > index);
     }
 
-    /// Puts intervals in two; those that pieces share stay whole. There are no floors.
-    pub fn halve(&mut self, cut: &[bool], pieces: &[Piece<'_>]) {
+    /// Puts each interval in so many equal parts; those that pieces share stay whole. There are no floors.
+    pub fn divide(&mut self, parts: &[usize], pieces: &[Piece<'_>]) {
         let old = std::mem::take(&mut self.chain);
         let owners = std::mem::take(&mut self.owners);
         // Where each interval begins now.
-        let mut starts = Vec::with_capacity(cut.len() + 1);
+        let mut starts = Vec::with_capacity(parts.len() + 1);
         for (index, (interval, junction)) in old.intervals.into_iter().zip(old.junctions).enumerate() {
             starts.push(self.chain.intervals.len());
+            let free = Junction { speed_squared_lu2_s2: f64::INFINITY, limit: interval.cap.limit };
             self.chain.junctions.push(junction);
-            self.owners.push(owners[index]);
-            if !cut[index] {
+            self.chain.junctions.resize(starts[index] + parts[index], free);
+            self.owners.resize(starts[index] + parts[index], owners[index]);
+            if parts[index] == 1 {
                 self.chain.intervals.push(interval);
                 continue;
             }
-            let path = pieces[owners[index]].path;
-            let middle_lu = 0.5 * (interval.start_lu + interval.end_lu);
-            self.chain.intervals.push(interval.part(path, interval.start_lu, middle_lu));
-            self.chain.intervals.push(interval.part(path, middle_lu, interval.end_lu));
-            self.chain.junctions.push(Junction { speed_squared_lu2_s2: f64::INFINITY, limit: interval.cap.limit });
-            self.owners.push(owners[index]);
+            let Piece { path, flow, .. } = &pieces[owners[index]];
+            let rules = flow.rules.throughout(path);
+            let border_lu = |part: usize| interval.start_lu + interval.length_lu() * part as f64 / parts[index] as f64;
+            for part in 0..parts[index] {
+                let to_lu = if part + 1 == parts[index] { interval.end_lu } else { border_lu(part + 1) };
+                self.chain.intervals.push(interval.part_by_itself(rules, path, border_lu(part), to_lu));
+            }
         }
         starts.push(self.chain.intervals.len());
         for Place { intervals, .. } in &mut self.places {

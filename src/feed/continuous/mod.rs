@@ -41,12 +41,6 @@ use std::sync::Arc;
 /// A plan reaches this many stopping distances beyond the piece that asks for it, if the window does.
 const REACH_RATIO: f64 = 8.0;
 
-/// Of a plan that ends in a stop which is not the program's, the last part is not kept: this many times the way from its last summit.
-const DISTURBED_RATIO: f64 = 1.6;
-
-/// One piece of so many is handed out at least before the next plan.
-const STALE_PIECES: usize = 20;
-
 /// Intervals of a plan at least, if the window has them.
 const REACH_INTERVALS: f64 = 24.0;
 
@@ -246,10 +240,12 @@ impl Continuous {
     /// A profile for `chain`. What is left of the plan before is a way that keeps every limit; where it does not brake for its own end it is about the
     /// fastest as well.
     fn attempt(&mut self, layout: &mut Layout, pieces: &[Piece<'_>], start: Start) -> Option<Profile> {
+        let handed_out = layout::handed_out(&layout.places);
         let Layout { chain, owners, .. } = layout;
         let (points, fast) = self.hints(chain);
         let look = look(pieces, owners);
         self.planning.is_last = pieces.last().is_some_and(|last| last.rests_after);
+        self.planning.handed_out = handed_out;
         let planned = self.planning.plan(chain, start, &points[..fast], &look);
         if planned.is_some() || points.len() <= fast {
             return planned;
@@ -323,22 +319,10 @@ impl Continuous {
         if rests {
             return;
         }
-        let ways: Vec<f64> = std::iter::once(0.0)
-            .chain(self.chain.intervals.iter().scan(0.0, |way_lu, interval| {
-                *way_lu += interval.length_lu();
-                Some(*way_lu)
-            }))
-            .collect();
-        let speed = |index: &usize| self.profile.points[*index].speed_squared_lu2_s2;
-        let summit = (1..=count).rev().find(|index| speed(&(index - 1)) < speed(index)).unwrap_or(0);
-        self.braking = summit;
-        let kept_lu = ways[count] - DISTURBED_RATIO * (ways[count] - ways[summit]);
-        self.kept = ways.partition_point(|way_lu| *way_lu <= kept_lu).saturating_sub(1);
+        self.braking = self.profile.summit();
+        self.kept = self.profile.kept(&self.chain);
         self.disturbed = self.kept;
-        // Where all of a plan brakes, planning again for each piece would cost more than a window that is a little shorter.
-        // The front is handed out in any case, and with it all that share its interval: a plan begins where an interval does.
-        let stale = (self.places.len() / STALE_PIECES).saturating_sub(1);
-        self.kept = self.places.get(stale).map_or(self.kept, |place| self.kept.max(place.intervals.end));
+        self.kept = self.kept.max(layout::handed_out(&self.places));
     }
 
     /// How many pieces a plan reaches; those that are no intervals by themselves get their grids. The first `known` ones have places already.

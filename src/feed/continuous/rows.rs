@@ -6,7 +6,7 @@
 //! Does not solve.
 
 use super::chain::{Chain, PathPoint, Start};
-use super::interior_point::{Problem, Transition};
+use super::interior_point::{Label, Problem, Transition};
 use super::interval::{AxisBound, Derivatives, Interval};
 
 /// How far above its estimate b is thought to come.
@@ -89,14 +89,14 @@ pub(super) struct NodeRows<'a> {
 
 impl NodeRows<'_> {
     /// `b b + slope b' + bend b'' <= bound`.
-    fn push(&mut self, [b, slope, bend]: [f64; 3], bound: f64) {
+    fn push(&mut self, label: Label, [b, slope, bend]: [f64; 3], bound: f64) {
         let Scale { b_lu2_s2: b_unit, slope_lu_s2: slope_unit, bend_per_s2: bend_unit } = self.scale;
-        self.problem.limit([b * b_unit, slope * slope_unit, bend * bend_unit], bound);
+        self.problem.limit(label, [b * b_unit, slope * slope_unit, bend * bend_unit], bound);
     }
 
     /// The same for a limit that does not give way.
     fn hold(&mut self, row: [f64; 3], bound: f64) {
-        self.push(row, bound);
+        self.push(Label::Cap, row, bound);
         self.problem.hold_last();
     }
 
@@ -107,7 +107,7 @@ impl NodeRows<'_> {
         }
         self.hold([1.0 / cap_lu2_s2, 0.0, 0.0], 1.0);
         let floor = self.floors_lu2_s2[0] / self.scale.b_lu2_s2;
-        self.push([-1.0 / self.scale.b_lu2_s2, 0.0, 0.0], -LOWEST_RATIO.max(floor));
+        self.push(Label::State, [-1.0 / self.scale.b_lu2_s2, 0.0, 0.0], -LOWEST_RATIO.max(floor));
         let Some(before) = before else {
             self.acceleration(after, 0, 0.0, after.reserve_ratio);
             return;
@@ -134,8 +134,8 @@ impl NodeRows<'_> {
             let (b, slope) = (state.second[bound.axis] / limit, 0.5 * state.first[bound.axis] / limit);
             if b != 0.0 || slope != 0.0 {
                 let row = ahead([b, slope, 0.0], ahead_lu);
-                self.push(row, 1.0);
-                self.push(row.map(|x| -x), 1.0);
+                self.push(Label::State, row, 1.0);
+                self.push(Label::State, row.map(|x| -x), 1.0);
             }
         }
     }
@@ -149,7 +149,7 @@ impl NodeRows<'_> {
             self.hold([1.0 / cap, 0.5 * h / cap, 0.0], 1.0);
             let lowest = self.scale.b_lu2_s2;
             let floor = self.floors_lu2_s2[0].min(self.floors_lu2_s2[1]) / lowest;
-            self.push([-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO.max(floor));
+            self.push(Label::State, [-1.0 / lowest, -0.5 * h / lowest, 0.0], -LOWEST_RATIO.max(floor));
         }
         if !interval.is_straight() {
             self.acceleration(interval, 1, 0.5 * h, interval.reserve_ratio);
@@ -174,7 +174,11 @@ impl NodeRows<'_> {
                 let x = 0.5 * place as f64 * h;
                 let tangent = 0.5 / estimate;
                 for sign in [1.0, -1.0] {
-                    self.push(ahead([sign * b + tangent, sign * slope, sign * bend], x), 1.5);
+                    self.push(
+                        Label::Place(place as u8),
+                        ahead([sign * b + tangent, sign * slope, sign * bend], x),
+                        1.5,
+                    );
                 }
             }
         }

@@ -1,27 +1,35 @@
-//! Finer intervals where a plan leaves limits unused because the path bends differently from one end of an interval to the other.
+//! Finer intervals where a plan loses time because they are too long.
 //!
-//! In: a layout with its profile. Out: the same with some intervals in two, and the faster profile on them. b'' is the same all along an
-//! interval: where q''' grows within it, as it does four times in every blend, the jerk reaches its limit at one end only. How far, only a
-//! profile tells; with intervals that are fine enough for any profile every blend would cost several times as much.
-//! Does not look at straight stretches: what is unused there is a change of sign of the jerk.
+//! In: a layout with its profile, and what the limits cost in that plan (`interior_point`). Out: the same with some intervals in parts, and the
+//! faster profile on them. b'' is the same all along an interval: where q''' grows within it, as it does four times in every blend, or √b on a
+//! ramp, the jerk reaches its limit at one end only. How much time that costs the multipliers of the plan tell to first order: the price of the
+//! limit times what the other places leave of it. With intervals that are fine enough for any profile every blend would cost several times as
+//! much to plan.
+//! Does not know rows or multipliers.
 
-use super::chain::{Chain, Profile, Start};
-use super::held;
-use super::layout::Layout;
+use super::chain::{Chain, PathPoint, Profile, Start};
+use super::interval::{Interval, cap};
+use super::layout::{self, Layout};
 use super::{Continuous, Piece, look};
 
-/// An interval whose jerk comes this near to its limit,
-const NEAR_RATIO: f64 = 0.9;
+/// What intervals that are too long may cost together, of the time of a plan; so far it pays to plan again.
+const COST_RATIO: f64 = 1e-3;
+const COST_MAX_RATIO: f64 = 2.5 * COST_RATIO;
 
-/// and which somewhere uses no more than this share of any limit, is too long.
-const UNUSED_RATIO: f64 = 0.75;
+/// Where a plan became so much faster than was expected, of its time, first order says too little: a profile may go from one limit to the opposite one
+/// and back where there was no room for that. There half of the cost and more is worth another plan.
+const SURPRISE_RATIO: f64 = 2e-3;
+const LEFT_SHARE: f64 = 0.4;
 
-/// So often at most, while it gains more than this share of the time.
-const PASSES_MAX: u32 = 3;
-const GAIN_MIN_RATIO: f64 = 4e-3;
+/// So often at most, and in so many parts at once.
+const PASSES_MAX: u32 = 5;
+const PARTS_MAX: usize = 4;
 
-/// Share of a plan, from its start, that is worth it, if it does not end where the path rests: the rest is planned again.
-const NEAR_SHARE: f64 = 0.6;
+/// An interval that takes less than this stays whole: what is gained there no axis sees.
+const SHORTEST_S: f64 = 4e-5;
+
+/// A limit that another part of the interval would not need counts as so much wider there at most.
+const WIDER_MAX_RATIO: f64 = 1.0;
 
 impl Continuous {
     /// Makes a new plan finer where that makes it faster.
@@ -36,55 +44,86 @@ impl Continuous {
         if !best.0.chain.floors_lu2_s2.is_empty() {
             return best;
         }
+        let mut surprises = false;
         for _ in 0..PASSES_MAX {
             let (layout, profile) = &best;
-            let range = layout.chain.control_range(start);
-            let share = if self.planning.is_last { 1.0 } else { NEAR_SHARE };
-            let near = range.start + (share * range.len() as f64).ceil() as usize;
-            let mut cut: Vec<bool> = (0..layout.chain.intervals.len())
-                .map(|index| range.contains(&index) && index < near && unused(&layout.chain, profile, index))
-                .collect();
-            for place in layout.places.iter().filter(|place| place.part_lu.is_some()) {
-                cut[place.intervals.clone()].fill(false);
+            let costs = self.costs(layout, profile, pieces, start);
+            let cost: f64 = costs.iter().sum();
+            if cost <= COST_MAX_RATIO && !surprises {
+                break;
             }
-            if !cut.contains(&true) {
+            let parts = parts(&costs, COST_RATIO.min(LEFT_SHARE * cost));
+            if parts.iter().all(|parts| *parts == 1) {
                 break;
             }
             let before_s = profile.time_s(&layout.chain);
             let mut finer = layout.clone();
-            finer.halve(&cut, pieces);
-            let hints = profile.halved(&layout.chain, &cut).points;
+            finer.divide(&parts, pieces);
+            let hints = profile.divided(&layout.chain, &parts);
+            self.planning.handed_out = layout::handed_out(&finer.places);
             let planned = self.planning.plan(&mut finer.chain, start, &hints, &look(pieces, &finer.owners));
             let Some(next) = planned else { break };
-            let gained_s = before_s - next.time_s(&finer.chain);
-            if gained_s > 0.0 {
-                best = (finer, next);
-            }
-            // NaN ends it too.
-            if gained_s.is_nan() || gained_s <= GAIN_MIN_RATIO * before_s {
+            let gained = 1.0 - next.time_s(&finer.chain) / before_s;
+            if gained.is_nan() || gained < 0.0 {
                 break;
             }
+            surprises = gained > cost + SURPRISE_RATIO;
+            best = (finer, next);
         }
         best
     }
+
+    /// What each interval costs because it is not in parts, of the time of the plan; after a plan of this layout. Nothing where the next plan comes
+    /// before it, or where pieces share it.
+    fn costs(&self, layout: &Layout, profile: &Profile, pieces: &[Piece<'_>], start: Start) -> Vec<f64> {
+        let Layout { chain, owners, .. } = layout;
+        let range = chain.control_range(start);
+        let near = range.end.min(self.planning.near(chain, profile));
+        let mut costs = vec![0.0; chain.intervals.len()];
+        for index in range.start..near {
+            let interval = &chain.intervals[index];
+            let v = profile.points[index].speed_squared_lu2_s2.sqrt();
+            let Some(prices) =
+                self.planning.prices(index - range.start).filter(|_| interval.length_lu() > SHORTEST_S * v)
+            else {
+                continue;
+            };
+            let tighter = (interval.base_reserve_ratio() / interval.reserve_ratio - 1.0).min(WIDER_MAX_RATIO);
+            let slower = if interval.is_straight() { 0.0 } else { slower(interval, &pieces[owners[index]]) };
+            let cost = prices.unused + prices.limits * tighter + prices.cap * slower;
+            costs[index] = if cost.is_finite() { cost } else { 0.0 };
+        }
+        for place in layout.places.iter().filter(|place| place.part_lu.is_some()) {
+            costs[place.intervals.clone()].fill(0.0);
+        }
+        costs
+    }
 }
 
-/// At one place the jerk is at its limit, at another one nothing is.
-fn unused(chain: &Chain, profile: &Profile, index: usize) -> bool {
-    let interval = &chain.intervals[index];
-    if interval.is_straight() || !interval.bounds.jerk_limited {
-        return false;
-    }
-    let (mut jerk_most, mut least) = (0.0_f64, f64::INFINITY);
-    for (place, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
-        let (point, bend) = profile.inside(chain, index, share);
-        let [acceleration, jerk] =
-            held::used(interval, &interval.states[place], &point, bend).map(|(used, _)| used / interval.reserve_ratio);
-        let feed = point.speed_squared_lu2_s2 / interval.cap.velocity_lu_s.powi(2);
-        jerk_most = jerk_most.max(jerk);
-        least = least.min(feed.max(acceleration).max(jerk));
-    }
-    jerk_most > NEAR_RATIO && least < UNUSED_RATIO
+/// By how much more b could be at the places of an interval than all along it, in the mean.
+fn slower(interval: &Interval, piece: &Piece<'_>) -> f64 {
+    let rules = piece.flow.rules.throughout(piece.path);
+    let wider = |state| {
+        let place = cap(rules, piece.path, &[state]).velocity_lu_s;
+        ((place / interval.cap.velocity_lu_s).powi(2) - 1.0).clamp(0.0, WIDER_MAX_RATIO)
+    };
+    let [from, middle, to] = &interval.states;
+    0.25 * wider(from) + 0.5 * wider(middle) + 0.25 * wider(to)
+}
+
+/// In how many parts each interval is put: the fewest that together cost no more than `left_ratio`. An interval in n parts costs an n-th of what it did, so that
+/// of all ways to the same cost that with n ~ √cost has the fewest parts.
+fn parts(costs: &[f64], left_ratio: f64) -> Vec<usize> {
+    let roots: f64 = costs.iter().map(|cost| cost.sqrt()).sum();
+    let part = |cost: &f64| {
+        let wanted = cost.sqrt() * roots / left_ratio;
+        let doubled = std::iter::successors(Some(1), |parts| Some(2 * parts)).take_while(|parts| *parts <= PARTS_MAX);
+        doubled
+            .take_while(|parts| *parts == 1 || *parts as f64 <= std::f64::consts::SQRT_2 * wanted)
+            .last()
+            .unwrap_or(1)
+    };
+    costs.iter().map(part).collect()
 }
 
 impl Profile {
@@ -94,18 +133,11 @@ impl Profile {
         chain.intervals.iter().enumerate().map(|(i, interval)| 2.0 * interval.length_lu() / (v(i) + v(i + 1))).sum()
     }
 
-    /// The same with some intervals in two.
-    fn halved(&self, chain: &Chain, cut: &[bool]) -> Self {
-        let mut halved = Self::default();
-        for (index, cut) in cut.iter().enumerate() {
-            halved.points.push(self.points[index]);
-            halved.bends_per_s2.push(self.bends_per_s2[index]);
-            if *cut {
-                halved.points.push(self.inside(chain, index, 0.5).0);
-                halved.bends_per_s2.push(self.bends_per_s2[index]);
-            }
-        }
-        halved.points.extend(self.points.last());
-        halved
+    /// The states at the borders when intervals are put in parts.
+    fn divided(&self, chain: &Chain, parts: &[usize]) -> Vec<PathPoint> {
+        let places = parts.iter().enumerate().flat_map(|(index, parts)| {
+            (0..*parts).map(move |part| self.inside(chain, index, part as f64 / *parts as f64).0)
+        });
+        places.chain(self.points.last().copied()).collect()
     }
 }
