@@ -296,13 +296,9 @@ impl AxisRules {
     /// The feed and what the velocities of the axes allow; `share` is the largest |q'| of an axis on the piece.
     pub(super) fn driven(&self, feed: FeedCap, share: impl Fn(AxisId) -> f64) -> SpeedCap {
         match feed {
-            FeedCap::Programmed(cap) => {
-                let limit = |axis: AxisId| self.feed_velocities_max_lu_s[axis.index()];
-                cap.min(self.largest(|axis, _| share(axis) / limit(axis)).cap(LimitKind::Velocity, 1))
-            }
+            FeedCap::Programmed(cap) => cap.min(self.axes_cap(false, share)),
             FeedCap::Rapid => {
-                let cap = self.largest(|axis, limits| share(axis) / limits.velocity_max_lu_s);
-                let cap = cap.cap(LimitKind::Velocity, 1);
+                let cap = self.axes_cap(true, share);
                 if self.rapid_override_ratio >= 1.0 {
                     return cap;
                 }
@@ -310,6 +306,16 @@ impl AxisRules {
                 SpeedCap { velocity_lu_s: cap.velocity_lu_s * self.rapid_override_ratio, limit }
             }
         }
+    }
+
+    /// What the velocities of the axes alone allow where each moves with this share of the speed.
+    pub(super) fn axes_cap(&self, rapid: bool, share: impl Fn(AxisId) -> f64) -> SpeedCap {
+        let most = self.largest(|axis, limits| {
+            let velocity_max_lu_s =
+                if rapid { limits.velocity_max_lu_s } else { self.feed_velocities_max_lu_s[axis.index()] };
+            share(axis) / velocity_max_lu_s
+        });
+        most.cap(LimitKind::Velocity, 1)
     }
 
     /// A line: every axis sees its share of v, a and j.

@@ -1,6 +1,6 @@
 //! The feed override at run time: limits from outside, closed forms on a line, and that it changes nothing else.
 
-use crate::support::{Program, Random, plan, plan_under, sample, spinner};
+use crate::support::{Program, Random, plan, plan_under, sample, spinner, test_machine_shipped};
 use sollwert::base::AxisId;
 use sollwert::feed::{LimitKind, OverrideSchedule, PlannedPiece};
 use sollwert::interpolator::{Interpolator, Setpoint};
@@ -289,6 +289,27 @@ fn rapids_are_left_alone() {
     assert!((held - 200.0).abs() < 1e-9, "{held}");
     // At 4 s both are true: what held it, and what holds it from there on.
     assert!(rows[3900..4000].iter().all(|row| row.path.limit.kind == LimitKind::Override));
+}
+
+/// A new plan whose start comes from a faster one lets the feed give way for a while: what it may not have are the velocities of the axes. Between
+/// two rapids, too, that are left alone.
+#[test]
+fn axis_velocities_hold_while_the_feed_gives_way() {
+    let mut machine = test_machine_shipped("xyzbc");
+    machine.feed.time_law = TimeLawKind::Continuous;
+    machine.smoothing.shape = BlendShape::Quintic;
+    let t_s = machine.cycle.time_base.setpoint_period_s();
+    let text = "G642\nG0 X0 Y0 Z0\nG1 F5000 X5 Y4\nG1 X16 Y6\nM30\n";
+    for overrides in ["0.001=200,0.201=100", "0.001=200,0.15=80,0.2=120", "0.1=150,0.3=60"] {
+        let rows = sampled(&machine, text, overrides);
+        for axis in machine.axis_ids() {
+            let most = rows.windows(2).fold(0.0_f64, |most, pair| {
+                most.max((pair[1].axes[axis].position_lu - pair[0].axes[axis].position_lu).abs() / t_s)
+            });
+            let allowed = machine.axis(axis).limits.velocity_max_lu_s;
+            assert!(most <= allowed * (1.0 + 1e-9), "--override {overrides}: axis {}: {most}", axis.index());
+        }
+    }
 }
 
 #[test]

@@ -37,6 +37,12 @@ const FLOOR_WAYS: f64 = 1.5;
 /// By how much the speeds of the plan before may be exceeded on the way.
 const LOOSE_RATIO: f64 = 1.002;
 
+/// Plans at most with caps that become lower where axes would be too fast.
+const SLOWER_ATTEMPTS_MAX: u32 = 6;
+
+/// What rounding makes of the velocity of an axis.
+const VELOCITY_ROUNDING_RATIO: f64 = 1e-9;
+
 /// What came of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::feed) enum Change {
@@ -180,16 +186,23 @@ impl Continuous {
                 layout.chain.floors_lu2_s2 = self.floors(&layout.chain, floor_lu);
                 self.settle(&mut layout, pieces, way_lu);
             }
-            self.trial(layout, pieces, start, way_lu, longer)
+            let mut trial = self.trial(layout, pieces, start, way_lu, longer)?;
+            for _ in 0..SLOWER_ATTEMPTS_MAX {
+                if keeps_velocities(&mut trial.layout, &trial.profile, pieces, way_lu) {
+                    return Some(trial);
+                }
+                trial = self.trial(trial.layout, pieces, start, way_lu, longer)?;
+            }
+            None
         };
         let found = attempt(0.0, None).or_else(|| shortest(guess_lu, most_lu, attempt));
         let Some(Trial { layout, profile, way_lu }) = found else {
             self.regime.moving_ratio = before;
             return false;
         };
+        self.regime.settling_lu = way_lu;
         let (layout, profile) = self.refined(layout, profile, pieces, start);
         self.adopt(layout, profile, rests);
-        self.regime.settling_lu = way_lu;
         true
     }
 
@@ -247,8 +260,8 @@ impl Continuous {
         let mut again = layout.clone();
         let better = self.planning.plan(&mut again.chain, start, &profile.points, &look(pieces, &layout.owners));
         match better {
-            Some(better) => (again, better),
-            None => (layout, profile),
+            Some(better) if keeps_velocities(&mut again, &better, pieces, self.regime.settling_lu) => (again, better),
+            _ => (layout, profile),
         }
     }
 
@@ -359,6 +372,52 @@ impl Continuous {
             (at_lu, index) = (end_lu, index + 1);
         }
     }
+
+    /// The same as [`Continuous::attempt`] where caps gave way: what they gave of the feed they may not give of the velocities of the axes.
+    pub(super) fn attempt_settling(
+        &mut self,
+        layout: &mut Layout,
+        pieces: &[Piece<'_>],
+        start: Start,
+    ) -> Option<Profile> {
+        for _ in 0..SLOWER_ATTEMPTS_MAX {
+            let profile = self.attempt(layout, pieces, start)?;
+            if keeps_velocities(layout, &profile, pieces, self.regime.settling_lu) {
+                return Some(profile);
+            }
+        }
+        None
+    }
+}
+
+/// True if the axes keep their velocities up to a place; else the caps become lower where they do not.
+fn keeps_velocities(layout: &mut Layout, profile: &Profile, pieces: &[Piece<'_>], way_lu: f64) -> bool {
+    let Layout { chain, owners, .. } = layout;
+    let look = look(pieces, owners);
+    let (mut keeps, mut at_lu) = (true, 0.0);
+    for index in 0..chain.intervals.len() {
+        if at_lu >= way_lu {
+            break;
+        }
+        let (start_lu, length_lu) = (chain.intervals[index].start_lu, chain.intervals[index].length_lu());
+        let piece = &pieces[owners[index]];
+        let rules = piece.flow.rules.throughout(piece.path);
+        let mut most = 0.0_f64;
+        for eighth in 0..=8 {
+            let share = 0.125 * f64::from(eighth);
+            let b = profile.inside(chain, index, share).0.speed_squared_lu2_s2;
+            let first = look(index, start_lu + share * length_lu).first;
+            let allowed = rules.axes_cap(piece.is_rapid(), |axis| first[axis].abs());
+            most = most.max(b.max(0.0).sqrt() / allowed.velocity_lu_s);
+        }
+        if most > 1.0 + VELOCITY_ROUNDING_RATIO {
+            keeps = false;
+            let cap = &mut chain.intervals[index].cap;
+            cap.velocity_lu_s /= most * (1.0 + VELOCITY_ROUNDING_RATIO);
+        }
+        at_lu += length_lu;
+    }
+    keeps
 }
 
 impl Trial {

@@ -108,7 +108,7 @@ pub(super) fn stretches(
         let count =
             if last || (cut_first && first == 0) { 0 } else { together(pieces, first, &speeds_lu_s[first - from..]) };
         let (stretch, count) = match joined(pieces, first, count) {
-            Some((interval, _)) if first == 0 && entry.is_some_and(|entry| fitting_ratio(&entry, &interval) < 1.0) => {
+            Some((interval, _)) if first == 0 && entry.is_some_and(|entry| !fits(&entry, &interval)) => {
                 (Stretch::Cut, 1)
             }
             Some((interval, count)) => (Stretch::Group(count, Box::new(interval)), count),
@@ -120,16 +120,24 @@ pub(super) fn stretches(
     stretches
 }
 
-/// How much of an interval may begin with a state: half of it later the speed squared, going on as it does, is still within what feed and axes
-/// allow. With less than all of it the interval has to be cut. A state that is too fast already is another matter.
-pub(super) fn fitting_ratio(entry: &PathPoint, interval: &Interval) -> f64 {
+/// All of an interval may begin with a state, or there is no way to find a part of it that may.
+fn fits(entry: &PathPoint, interval: &Interval) -> bool {
+    let length_lu = interval.length_lu();
+    let b = entry.speed_squared_lu2_s2 + 0.5 * length_lu * entry.slope_lu_s2.max(0.0);
+    b <= interval.cap.velocity_lu_s.powi(2) * (1.0 + CAP_ROUNDING_RATIO)
+}
+
+/// How much of an interval may begin with a state: there, and half of it later, going on as it does, the speed squared is within what feed and axes
+/// allow. With less than all of it the interval has to be cut. `cap_lu_s`: highest speed all along a share of it.
+pub(super) fn fitting_ratio(entry: &PathPoint, length_lu: f64, cap_lu_s: impl Fn(f64) -> f64) -> f64 {
     let (b, slope) = (entry.speed_squared_lu2_s2, entry.slope_lu_s2);
-    let cap = interval.cap.velocity_lu_s * interval.cap.velocity_lu_s * (1.0 + CAP_ROUNDING_RATIO);
-    let mut ratio = 1.0;
-    while b < cap && b + 0.5 * ratio * interval.length_lu() * slope > cap && ratio > FITTING_MIN_RATIO {
-        ratio *= 0.5;
-    }
-    ratio
+    let fits = |ratio: &f64| {
+        let cap = cap_lu_s(*ratio).powi(2) * (1.0 + CAP_ROUNDING_RATIO);
+        b.max(b + 0.5 * ratio * length_lu * slope) <= cap
+    };
+    let halves = std::iter::successors(Some(1.0), |ratio| Some(0.5 * ratio));
+    // One that is too fast for any of it goes on as it is.
+    halves.take_while(|ratio| *ratio >= FITTING_MIN_RATIO).find(fits).unwrap_or(1.0)
 }
 
 /// Speeds at the starts of `pieces[from..]` and at the end, about: from `entry_lu_s` they rise, before the stop at the end they fall, and so they do

@@ -133,19 +133,22 @@ impl Problem {
     }
 
     /// By how much the cost would fall, about, if the control after a node could be another one at each of the three places that hold it: to first
-    /// order, with what each place leaves unused, and no more than all of the limit.
+    /// order. What pushes to one side gains with what each place leaves unused, no more than all of the limit; where one place pushes up and
+    /// another one down they hold the state between them, and each would go by a whole limit.
     pub fn unused_ratio(&self, node: usize) -> f64 {
         let held = || self.rows_of(node).iter().filter(|row| matches!(row.label, Label::Place(_)));
-        let price: f64 = held().map(|row| row.multiplier * row.a[2]).sum();
         let most = held().filter(|row| row.multiplier > 0.0).map(|row| row.a[2].abs()).fold(0.0, f64::max);
         if most == 0.0 {
             return 0.0;
         }
+        let at = |place: u8| held().filter(move |row| row.label == Label::Place(place));
+        let prices = [0, 1, 2].map(|place| at(place).map(|row| row.multiplier * row.a[2]).sum::<f64>());
+        let [up, down] = [1.0, -1.0].map(|sign| prices.iter().map(|price| (sign * price).max(0.0)).sum::<f64>());
         let free = |place: u8| {
-            let rows = held().filter(|row| row.label == Label::Place(place) && row.a[2] * price > 0.0);
+            let rows = at(place).filter(|row| row.a[2] * (up - down) > 0.0);
             rows.map(|row| row.slack / row.a[2].abs()).fold(1.0 / most, f64::min)
         };
-        price.abs() * (0.25 * free(0) + 0.5 * free(1) + 0.25 * free(2))
+        (up - down).abs() * (0.25 * free(0) + 0.5 * free(1) + 0.25 * free(2)) + up.min(down) / most
     }
 }
 

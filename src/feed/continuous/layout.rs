@@ -175,6 +175,7 @@ impl Layout {
         let count = grid.map_or(0, |grid| grid.intervals.len());
         let rests = grid.map_or([false; 2], |grid| grid.rests);
         let (cut_first, cut_last) = (starts_at_rest && !rests[0], ends_at_rest && !rests[1]);
+        let rules = piece.flow.rules.throughout(piece.path);
         let at_start = junction(piece);
         let free = Junction { speed_squared_lu2_s2: f64::INFINITY, limit: at_start.limit };
         let mut junction = if starts_at_rest { free } else { at_start };
@@ -184,8 +185,13 @@ impl Layout {
             if cut_first && index == 0 {
                 borders.extend(CUTS_RATIO.map(|ratio| interval.start_lu + ratio * h));
             }
-            let fitting =
-                self.entry.filter(|_| start == 0 && index == 0).map_or(1.0, |entry| fitting_ratio(&entry, interval));
+            let entry = self.entry.filter(|_| start == 0 && index == 0);
+            let part = |to_lu| interval.part_by_itself(rules, piece.path, interval.start_lu, to_lu);
+            let cap_lu_s = |ratio: f64| {
+                let whole = ratio == 1.0;
+                if whole { interval.cap.velocity_lu_s } else { part(interval.start_lu + ratio * h).cap.velocity_lu_s }
+            };
+            let fitting = entry.map_or(1.0, |entry| fitting_ratio(&entry, h, cap_lu_s));
             if fitting < 1.0 && !(cut_first && index == 0) {
                 borders.push(interval.start_lu);
                 let parts =
@@ -204,7 +210,12 @@ impl Layout {
                 continue;
             }
             for pair in borders.windows(2).filter(|pair| pair[1] > pair[0]) {
-                self.chain.intervals.push(interval.part(piece.path, pair[0], pair[1]));
+                let part = if fitting < 1.0 {
+                    interval.part_by_itself(rules, piece.path, pair[0], pair[1])
+                } else {
+                    interval.part(piece.path, pair[0], pair[1])
+                };
+                self.chain.intervals.push(part);
                 self.chain.junctions.push(std::mem::replace(&mut junction, free));
             }
         }

@@ -177,11 +177,20 @@ impl Continuous {
         let count = self.reach(pieces, known, start);
         let mut layout = self.layout(pieces, count, known, start);
         let pieces = &pieces[..count];
-        if self.regime.settling_lu > 0.0 {
+        let settles = self.regime.settling_lu > 0.0;
+        if settles {
             self.settle(&mut layout, pieces, self.regime.settling_lu);
         }
-        let Some(profile) = self.attempt(&mut layout, pieces, start) else { return false };
-        let (layout, profile) = self.sharpened(layout, profile, pieces, start);
+        let planned = if settles {
+            self.attempt_settling(&mut layout, pieces, start)
+        } else {
+            self.attempt(&mut layout, pieces, start)
+        };
+        let Some(mut profile) = planned else { return false };
+        // Finer intervals would have the caps of their own again.
+        if !settles {
+            (layout, profile) = self.sharpened(layout, profile, pieces, start);
+        }
         let rests = pieces.last().is_some_and(|last| last.rests_after);
         self.adopt(layout, profile, rests);
         true

@@ -14,7 +14,7 @@ use super::{Continuous, Piece, look};
 
 /// What intervals that are too long may cost together, of the time of a plan; so far it pays to plan again.
 const COST_RATIO: f64 = 1e-3;
-const COST_MAX_RATIO: f64 = 2.5 * COST_RATIO;
+const COST_MAX_RATIO: f64 = 1.5 * COST_RATIO;
 
 /// Where a plan became so much faster than was expected, of its time, first order says too little: a profile may go from one limit to the opposite one
 /// and back where there was no room for that. There half of the cost and more is worth another plan.
