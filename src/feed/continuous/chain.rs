@@ -184,10 +184,10 @@ impl Planning {
     }
 
     /// Of the interval after a node of the last plan; `None` if that was not the solution of its last problem.
-    pub fn prices(&self, node: usize) -> Option<Prices> {
+    pub fn prices(&self, node: usize, pinched: bool) -> Option<Prices> {
         let is_cap = |label| label == Label::Cap;
         self.solved.then(|| Prices {
-            unused: self.problem.unused_ratio(node),
+            unused: self.problem.unused_ratio(node, pinched),
             limits: self.problem.price_ratio(node, |label| !is_cap(label)),
             cap: self.problem.price_ratio(node, is_cap) + self.problem.price_ratio(node + 1, is_cap),
         })

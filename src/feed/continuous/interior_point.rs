@@ -134,8 +134,8 @@ impl Problem {
 
     /// By how much the cost would fall, about, if the control after a node could be another one at each of the three places that hold it: to first
     /// order. What pushes to one side gains with what each place leaves unused, no more than all of the limit; where one place pushes up and
-    /// another one down they hold the state between them, and each would go by a whole limit.
-    pub fn unused_ratio(&self, node: usize) -> f64 {
+    /// another one down (`pinched`: that counts too) they hold the state between them, and each would go by a whole limit.
+    pub fn unused_ratio(&self, node: usize, pinched: bool) -> f64 {
         let held = || self.rows_of(node).iter().filter(|row| matches!(row.label, Label::Place(_)));
         let most = held().filter(|row| row.multiplier > 0.0).map(|row| row.a[2].abs()).fold(0.0, f64::max);
         if most == 0.0 {
@@ -148,7 +148,8 @@ impl Problem {
             let rows = at(place).filter(|row| row.a[2] * (up - down) > 0.0);
             rows.map(|row| row.slack / row.a[2].abs()).fold(1.0 / most, f64::min)
         };
-        (up - down).abs() * (0.25 * free(0) + 0.5 * free(1) + 0.25 * free(2)) + up.min(down) / most
+        (up - down).abs() * (0.25 * free(0) + 0.5 * free(1) + 0.25 * free(2))
+            + if pinched { up.min(down) / most } else { 0.0 }
     }
 }
 

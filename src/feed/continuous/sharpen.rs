@@ -14,7 +14,7 @@ use super::{Continuous, Piece, look};
 
 /// What intervals that are too long may cost together, of the time of a plan; so far it pays to plan again.
 const COST_RATIO: f64 = 1e-3;
-const COST_MAX_RATIO: f64 = 1.5 * COST_RATIO;
+const COST_MAX_RATIO: f64 = 2.0 * COST_RATIO;
 
 /// Where a plan became so much faster than was expected, of its time, first order says too little: a profile may go from one limit to the opposite one
 /// and back where there was no room for that. There half of the cost and more is worth another plan.
@@ -31,6 +31,9 @@ const SHORTEST_S: f64 = 4e-5;
 /// A limit that another part of the interval would not need counts as so much wider there at most.
 const WIDER_MAX_RATIO: f64 = 1.0;
 
+/// A speed whose price is less does not hold the interval.
+const PRICE_MIN: f64 = 1e-7;
+
 impl Continuous {
     /// Makes a new plan finer where that makes it faster.
     pub(super) fn sharpened(
@@ -45,9 +48,9 @@ impl Continuous {
             return best;
         }
         let mut surprises = false;
-        for _ in 0..PASSES_MAX {
+        for pass in 0..PASSES_MAX {
             let (layout, profile) = &best;
-            let costs = self.costs(layout, profile, pieces, start);
+            let costs = self.costs(layout, profile, pieces, start, pass == 0);
             let cost: f64 = costs.iter().sum();
             if cost <= COST_MAX_RATIO && !surprises {
                 break;
@@ -74,8 +77,9 @@ impl Continuous {
     }
 
     /// What each interval costs because it is not in parts, of the time of the plan; after a plan of this layout. Nothing where the next plan comes
-    /// before it, or where pieces share it.
-    fn costs(&self, layout: &Layout, profile: &Profile, pieces: &[Piece<'_>], start: Start) -> Vec<f64> {
+    /// before it, or where an interval is a short piece or several: what these would gain is not worth their number. `first`: nothing is known yet of how a
+    /// finer plan is.
+    fn costs(&self, layout: &Layout, profile: &Profile, pieces: &[Piece<'_>], start: Start, first: bool) -> Vec<f64> {
         let Layout { chain, owners, .. } = layout;
         let range = chain.control_range(start);
         let near = range.end.min(self.planning.near(chain, profile));
@@ -84,17 +88,23 @@ impl Continuous {
             let interval = &chain.intervals[index];
             let v = profile.points[index].speed_squared_lu2_s2.sqrt();
             let Some(prices) =
-                self.planning.prices(index - range.start).filter(|_| interval.length_lu() > SHORTEST_S * v)
+                self.planning.prices(index - range.start, first).filter(|_| interval.length_lu() > SHORTEST_S * v)
             else {
                 continue;
             };
             let tighter = (interval.base_reserve_ratio() / interval.reserve_ratio - 1.0).min(WIDER_MAX_RATIO);
-            let slower = if interval.is_straight() { 0.0 } else { slower(interval, &pieces[owners[index]]) };
+            let slower = if interval.is_straight() || prices.cap < PRICE_MIN {
+                0.0
+            } else {
+                slower(interval, &pieces[owners[index]])
+            };
             let cost = prices.unused + prices.limits * tighter + prices.cap * slower;
             costs[index] = if cost.is_finite() { cost } else { 0.0 };
         }
-        for place in layout.places.iter().filter(|place| place.part_lu.is_some()) {
-            costs[place.intervals.clone()].fill(0.0);
+        for (place, piece) in layout.places.iter().zip(pieces) {
+            if place.part_lu.is_some() || (place.intervals.len() == 1 && piece.flow.brief.is_some()) {
+                costs[place.intervals.clone()].fill(0.0);
+            }
         }
         costs
     }
