@@ -46,14 +46,14 @@ pub(super) struct IdentifyArguments {
     #[command(flatten)]
     pub(super) machine: MachineChoice,
     /// Axis; may be given several times; default: every axis of the traces that the machine has
-    #[arg(long = "axis", value_name = "AXIS")]
+    #[arg(long = "axis", value_name = "AXIS", conflicts_with = "smoothing")]
     pub(super) axes: Vec<String>,
     #[command(flatten)]
     names: TraceNames,
     #[command(flatten)]
     pub(super) surroundings: Surroundings,
     /// Least squares only: no fit of the simulated axis
-    #[arg(long)]
+    #[arg(long, conflicts_with = "smoothing")]
     linear: bool,
     /// Machine file to write, with the values, their intervals as comments, and everything else as it was; with --plan a folder
     #[arg(short, long, value_name = "MACHINE.toml")]

@@ -273,17 +273,20 @@ impl<'a, 'b> Search<'a, 'b> {
         windows.sort_unstable();
         windows.dedup();
         let mut costs = self.costs(&windows);
+        // A window that ends in an alarm has no cost.
+        let mut tried = windows;
         loop {
             let Some(best) = least(&costs) else { return costs };
             let below = best.checked_sub(1).map_or(costs[best].0, |k| costs[k].0);
             let above = costs.get(best + 1).map_or(costs[best].0, |next| next.0);
-            let inside: Vec<usize> = (below + 1..above).filter(|blocks| *blocks != costs[best].0).collect();
+            let inside: Vec<usize> = (below + 1..above).filter(|blocks| !tried.contains(blocks)).collect();
             if inside.is_empty() {
                 return costs;
             }
             let stride = inside.len().div_ceil(BETWEEN);
             let more: Vec<usize> = inside.into_iter().step_by(stride).collect();
             costs.extend(self.costs(&more));
+            tried.extend(more);
             costs.sort_by_key(|(blocks, _)| *blocks);
         }
     }

@@ -134,8 +134,9 @@ pub fn calibrate(
     let (old, new) = (Arc::new(machine.clone()), Arc::new(after));
     for pair in fitted.iter().chain(unseen) {
         let (target, axes) = target(pair, machine)?;
-        let one =
-            |machine: &Arc<Machine>| PathProfile::planned(machine, &pair.setup, &axes).ok_or_else(|| refused(ALARM));
+        let one = |machine: &Arc<Machine>| {
+            PathProfile::planned(machine, &pair.setup, &axes, target.time_s).ok_or_else(|| refused(ALARM))
+        };
         let (before, after) = (one(&old)?, one(&new)?);
         result.agreements.push((agreement(&before, &target), agreement(&after, &target)));
         result.feeds.push(FeedOverPath {
@@ -151,7 +152,7 @@ pub fn calibrate(
     }
 }
 
-const ALARM: &str = "a program ends in an alarm on this machine";
+const ALARM: &str = "a program ends in an alarm on this machine, or does not end";
 
 /// The programs of the fit, each along the path of its trace, and the axes that they move.
 fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Target>, Vec<AxisId>), Diagnostic> {
@@ -159,8 +160,8 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
     let mut moved: Vec<AxisId> = Vec::new();
     for pair in fitted {
         let (profile, axes) = target(pair, machine)?;
-        let before =
-            PathProfile::planned(&Arc::new(machine.clone()), &pair.setup, &axes).ok_or_else(|| refused(ALARM))?;
+        let before = PathProfile::planned(&Arc::new(machine.clone()), &pair.setup, &axes, profile.time_s)
+            .ok_or_else(|| refused(ALARM))?;
         if (before.length_mm / profile.length_mm - 1.0).abs() > LENGTH_SHARE {
             return Err(refused(&format!(
                 "the path of the trace is {:.3} mm long, that of the program {:.3} mm",

@@ -197,7 +197,7 @@ fn velocity_feedforward(records: &[AxisRecord], found: &mut Vec<Estimate>, resul
         }
         return;
     };
-    gain_and_delay(&lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found);
+    gain_and_delay(&lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found, result);
 }
 
 /// The two lags of a signal of the set-point.
@@ -216,9 +216,21 @@ fn fits(lagged: &Lagged, what: &str, result: &mut AxisResult) -> bool {
 }
 
 /// Sum of two lags, and their centre of mass as a delay.
-fn gain_and_delay(lagged: &Lagged, period_s: f64, gain: Parameter, scale: f64, found: &mut Vec<Estimate>) {
+fn gain_and_delay(
+    lagged: &Lagged,
+    period_s: f64,
+    gain: Parameter,
+    scale: f64,
+    found: &mut Vec<Estimate>,
+    result: &mut AxisResult,
+) {
     let (value, half) = lagged.solution.function(0, |theta| theta[0] + theta[1]);
     found.push(Estimate::around(gain, value, half, Means::Lags).scaled(scale));
+    if value.abs() <= half {
+        let reason = "the feed-forward is as good as none in this trace: nothing is delayed";
+        result.refuse(Parameter::FeedforwardDelay, reason, "record with FFWON");
+        return;
+    }
     if found.iter().all(|known| known.parameter != Parameter::FeedforwardDelay) {
         let lag = lagged.n as f64;
         let (share, half) = lagged.solution.function(1, |theta| theta[1] / (theta[0] + theta[1]));
@@ -244,7 +256,7 @@ fn torque_feedforward(records: &[AxisRecord], data: &DriveData, found: &mut Vec<
     match best_lag(records, response, regressors).filter(|lagged| fits(lagged, "torque feed-forward", result)) {
         Some(lagged) if inertia > 0.0 => {
             let scale = data.mechanics.transmission_lu_per_rad / inertia;
-            gain_and_delay(&lagged, records[0].period_s, Parameter::TorqueFeedforward, scale, found);
+            gain_and_delay(&lagged, records[0].period_s, Parameter::TorqueFeedforward, scale, found, result);
             result.verdicts.push(format!(
                 "torque feed-forward: the trace tells weight times inertia; the weight is given for the inertia {inertia} of the machine file"
             ));
@@ -261,6 +273,9 @@ fn torque_feedforward(records: &[AxisRecord], data: &DriveData, found: &mut Vec<
         ),
     }
 }
+
+/// A set-point delay whose interval is wider to each side is none.
+const DELAY_WIDE_CYCLES: f64 = 0.5;
 
 fn setpoint_delay(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mut AxisResult) {
     if !have(records, |record| &record.reference_lu) {
@@ -286,6 +301,12 @@ fn setpoint_delay(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mu
     let step = rms_step(records);
     let (share, half) = lagged.solution.function(0, |theta| -theta[0]);
     let period_s = records[0].period_s;
+    if half > DELAY_WIDE_CYCLES {
+        let reason =
+            format!("the reference hardly follows the set-point: the delay is known to ±{half:.1} cycles only");
+        result.refuse(Parameter::SetpointDelay, reason, "record a longer motion with the control deviation");
+        return;
+    }
     let delay = Estimate::around(Parameter::SetpointDelay, (lagged.n as f64 + share).max(0.0), half, Means::Lags);
     found.push(delay.scaled(period_s));
     // What a wrong shape leaves over is some share of the way of a cycle.
@@ -361,7 +382,7 @@ fn position_gain(records: &[AxisRecord], data: &DriveData, found: &mut Vec<Estim
     };
     let lagged = best_lag(records, response, regressors);
     if let Some(lagged) = &lagged {
-        gain_and_delay(lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found);
+        gain_and_delay(lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found, result);
         let mut solution = lagged.solution.clone();
         // The gain stands in the third column here.
         solution.theta = solution.theta.rows(2, 1).into_owned();

@@ -21,6 +21,8 @@ const FEW: usize = 5;
 const DRAWN: usize = 750;
 /// Set-points at most: five hours at 1 ms.
 const SETPOINTS_MAX: usize = 20_000_000;
+/// A program that goes on longer outside of its trace is endless.
+const ENDLESS_S: f64 = 3600.0;
 /// A step below this is standstill.
 const STEP_MIN_MM: f64 = 1e-7;
 
@@ -120,15 +122,19 @@ impl PathProfile {
         Some(profile)
     }
 
-    /// Of a program as this machine plans it; `None` after an alarm.
-    pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId]) -> Option<Self> {
+    /// Of a program as this machine plans it; `None` after an alarm, and where it goes on for an hour and four times as long as the trace did.
+    pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId], traced_s: f64) -> Option<Self> {
         let mut kernel = Kernel::new(machine.clone(), setup.clone(), false);
         let period_s = machine.cycle.time_base.seconds(machine.cycle.time_base.ticks_per_setpoint());
         let mut places = Vec::new();
         let (mut feed_sum, mut feed_count) = (0.0, 0.0_f64);
         // Until the program says otherwise all of it is.
         let mut traced = true;
-        loop {
+        let cycles_max = ((ENDLESS_S + 4.0 * traced_s) / period_s) as usize;
+        for cycle in 0.. {
+            if cycle > cycles_max || places.len() > SETPOINTS_MAX {
+                return None;
+            }
             let status = kernel.cycle().ok()?;
             for event in kernel.output().begun.iter().flat_map(|begun| &begun.events) {
                 let Event::Trace(starts) = event else { continue };
@@ -153,9 +159,6 @@ impl PathProfile {
             }
             if status == Status::Finished {
                 break;
-            }
-            if places.len() > SETPOINTS_MAX {
-                return None;
             }
         }
         Self::of(&places, period_s, feed_sum / feed_count.max(1.0))

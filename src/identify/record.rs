@@ -9,6 +9,7 @@ use crate::base::units::rad_from_deg;
 use crate::base::{AxisKind, Diagnostic};
 use crate::machine::{Axis, DriveData};
 use crate::trace::{Clock, Method, Signal, TimeGrid, Trace};
+use std::f64::consts::TAU;
 
 /// Samples of one axis at its position cycle (or at the slower cycle of the trace).
 #[derive(Clone, Debug)]
@@ -124,7 +125,23 @@ impl Reader<'_> {
         if self.axis.kind == AxisKind::Rotary {
             values.iter_mut().for_each(|value| *value = rad_from_deg(*value));
         }
+        if self.axis.modulo && stem.starts_with("position_") {
+            unwrap(&mut values);
+        }
         Some(values)
+    }
+}
+
+/// A modulo axis goes on behind 360 deg instead of beginning again.
+fn unwrap(angles_rad: &mut [f64]) {
+    let (mut turns, mut before) = (0.0, f64::NAN);
+    for angle_rad in angles_rad.iter_mut().filter(|angle| angle.is_finite()) {
+        let raw_rad = *angle_rad;
+        if before.is_finite() {
+            turns -= ((raw_rad - before) / TAU).round();
+        }
+        before = raw_rad;
+        *angle_rad = raw_rad + turns * TAU;
     }
 }
 

@@ -96,7 +96,7 @@ impl Fit<'_> {
         let mut all = Vec::new();
         let share = 1.0 / (self.targets.len() as f64).sqrt();
         for target in self.targets {
-            let planned = PathProfile::planned(&machine, &target.setup, &target.axes)?;
+            let planned = PathProfile::planned(&machine, &target.setup, &target.axes, target.profile.time_s)?;
             if aim == Aim::Both {
                 let floor = FLOOR_SHARE * target.profile.feeds_mm_s.iter().sum::<f64>() / CELLS as f64;
                 let weight = share / (CELLS as f64).sqrt();
