@@ -11,7 +11,7 @@ use crate::base::units::deg_from_rad;
 /// Points in a row of a map: odd, so that the optimum is one of them.
 const POINTS: usize = 11;
 /// Steps of a search to either side.
-const REACH_STEPS: f64 = 5.0;
+const REACH_STEPS: f64 = 2.5;
 
 /// The objective over two gains.
 #[derive(Clone, Debug)]
@@ -30,7 +30,8 @@ pub struct Map {
 pub(super) fn maps(group: &Group<'_>, gains: &[Gains]) -> Vec<Landscape> {
     let mut found = Vec::new();
     for (place, member) in group.members.iter().enumerate() {
-        let of_axis: Vec<&Slot> = group.slots.iter().filter(|slot| slot.members.contains(&place)).collect();
+        let mut of_axis: Vec<&Slot> = group.slots.iter().filter(|slot| slot.members.contains(&place)).collect();
+        of_axis.sort_by_key(|slot| slot.gain as usize);
         let Some((across, others)) = of_axis.split_first() else { continue };
         for up in others {
             let axis = group.machine.axis(member.axis);
