@@ -4,14 +4,14 @@
 
 use super::tune_tables::{objective, remark, share_percent, shown};
 use crate::report::escape;
-use crate::tune::{CourseFigures, Gain, Landscape, Measure, Pair, TuneOptions, Tuned, TunedAxis};
+use crate::tune::{CourseFigures, Landscape, Measure, Pair, TuneOptions, Tuned, TunedAxis};
 
 const STYLE: &str = "\
 :root{color-scheme:light dark;--ink:#1b1f24;--paper:#fff;--grid:#d7dce1;--soft:#5b6670}\
 @media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--paper:#14171a;--grid:#343a40;--soft:#9aa5b1}}\
-body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:64rem;margin:2rem auto;padding:0 1rem}\
+body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:76rem;margin:2rem auto;padding:0 1rem}\
 .table{overflow-x:auto;margin:0 0 1.2rem}table{border-collapse:collapse}\
-td,th{padding:.15rem .9rem .15rem 0;text-align:left;border-bottom:1px solid var(--grid);white-space:nowrap}\
+td,th{padding:.15rem .7rem .15rem 0;text-align:left;border-bottom:1px solid var(--grid);white-space:nowrap}\
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}tr.sum td{font-weight:600}td.in{padding-left:1rem}\
 .soft,caption{color:var(--soft)}caption{text-align:left;white-space:normal;padding-bottom:.3rem}\
 .maps{display:flex;flex-wrap:wrap;gap:1.5rem}figure{margin:0;flex:1 1 26rem;max-width:34rem}\
@@ -117,8 +117,7 @@ fn errors(courses: &[CourseFigures]) -> String {
         rows.push(("in", cells("contour error".to_owned(), &course.contour_mm, "mm")));
     }
     let head = ["", "RMS before", "after", "change", "floor", "Peak before", "after", "change", "floor"];
-    let caption =
-        "Bold: what was to be small. Floor: the new gains without dry friction, which no feed-forward takes away.";
+    let caption = "Bold: what was to be small. Floor: the new gains without dry friction; what is above it is what friction leaves.";
     format!("<h2>Before and after</h2>\n{}", html_table(caption, &head, &rows))
 }
 
@@ -145,12 +144,7 @@ fn drawing(landscape: &Landscape, axis: &TunedAxis) -> String {
     let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
     let (width, height) = (LEFT + CELL * columns as f64 + 4.0, CELL * rows as f64 + BOTTOM);
     let unit = if map.unit == "mm" { "µm" } else { "thousandths of a degree" };
-    let label = |gain: Gain| {
-        let unit = gain.unit(axis.kind);
-        let key = gain.key(axis.kind);
-        if unit.is_empty() { key.to_owned() } else { format!("{key}, {unit}") }
-    };
-    let names = map.gains.map(label);
+    let names = map.gains.map(|gain| gain.key(axis.kind));
     let name = escape(&landscape.axis);
     let mut svg = format!(
         "<figure><figcaption><strong>{name}</strong>: {} up, {} across; cells in {unit}</figcaption>\n\

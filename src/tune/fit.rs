@@ -37,11 +37,10 @@ pub(super) struct Point {
 
 /// Bases with their derivatives, all in one run.
 pub(super) fn points(group: &Group<'_>, bases: Vec<Vec<Gains>>, theory: &[Gains]) -> Vec<Point> {
-    let steps: Vec<Vec<f64>> = bases.iter().map(|base| difference_steps(group, base)).collect();
     let mut candidates = Vec::new();
-    for (base, steps) in bases.iter().zip(&steps) {
+    for base in &bases {
         candidates.push(base.clone());
-        for (slot, step) in group.slots.iter().zip(steps) {
+        for (slot, step) in group.slots.iter().zip(difference_steps(group, base)) {
             let (mut moved, value) = (base.clone(), group.value(base, slot) + step);
             for member in &slot.members {
                 moved[*member] = moved[*member].with(slot.gain, value);
@@ -55,9 +54,8 @@ pub(super) fn points(group: &Group<'_>, bases: Vec<Vec<Gains>>, theory: &[Gains]
         let own: Vec<&[Residual]> =
             residuals.iter().map(|course| &course[number * each..(number + 1) * each]).collect();
         let score = score(own.iter().filter_map(|course| course.first()));
-        let normal = Normal::new(&own, &steps[number]);
-        let (square, slope) = normal.sums();
-        let step = Step::new(group, &normal, &gains, theory).solve(&square, &slope);
+        let normal = Normal::around(group, &gains, &own);
+        let step = Step::new(group, &normal, &gains, theory).solve(&normal);
         let predicted = group.slots.iter().zip(&step).map(|(slot, part)| group.value(&gains, slot) + part).collect();
         Point { gains, score, normal, predicted, spread: step.iter().map(|part| part * part).collect() }
     };

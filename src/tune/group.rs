@@ -518,6 +518,7 @@ fn group<'a>(
         .filter_map(|id| {
             let axis = machine.axis(*id);
             let data = axis.drive.clone()?;
+            let position_cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
             let pulses = options.gains.contains(&Gain::Friction) || data.options.friction_pulse_lu_s > 0.0;
             let idle = |gain: &Gain| match gain {
                 Gain::Torque => data.feedforward_inertia_kg_m2 == 0.0,
@@ -528,7 +529,7 @@ fn group<'a>(
             let free = Gain::ALL.into_iter().filter(|gain| options.gains.contains(gain) && !idle(gain));
             // Without friction there is nothing to compensate.
             let ranges = free
-                .map(|gain| (gain, range(options, gain, axis, &data)))
+                .map(|gain| (gain, range(options, gain, axis, &data, position_cycle_s)))
                 .filter(|(_, range)| range[1] > range[0])
                 .collect();
             Some(Member { axis: *id, data, ranges })
@@ -572,6 +573,7 @@ fn tuned_axes(group: &Group<'_>, gains: &[Gains], certainty: &[Certainty]) -> Ve
                 certain: certainty.certain,
             });
         }
+        of_axis.sort_by_key(|tuned| tuned.gain as usize);
         TunedAxis { axis: member.axis, name: name(place), kind, gains: of_axis, together }
     };
     group.members.iter().enumerate().map(of_member).collect()

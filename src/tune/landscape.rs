@@ -10,8 +10,9 @@ use crate::base::units::deg_from_rad;
 
 /// Points in a row of a map: odd, so that the optimum is one of them.
 const POINTS: usize = 11;
-/// Steps of a search to either side.
+/// Steps of a search to either side; the valley of velocity feed-forward is the narrowest.
 const REACH_STEPS: f64 = 2.5;
+const REACH_VELOCITY_STEPS: f64 = 1.0;
 
 /// The objective over two gains.
 #[derive(Clone, Debug)]
@@ -44,7 +45,8 @@ pub(super) fn maps(group: &Group<'_>, gains: &[Gains]) -> Vec<Landscape> {
 
 fn map(group: &Group<'_>, gains: &[Gains], slots: [&Slot; 2], kind: AxisKind) -> Map {
     let line = |slot: &Slot| -> Vec<f64> {
-        let (centre, reach) = (group.value(gains, slot), REACH_STEPS * slot.gain.step(slot.range));
+        let steps = if slot.gain == Gain::Velocity { REACH_VELOCITY_STEPS } else { REACH_STEPS };
+        let (centre, reach) = (group.value(gains, slot), steps * slot.gain.step(slot.range));
         let [low, high] = [(centre - reach).max(slot.range[0]), (centre + reach).min(slot.range[1])];
         (0..POINTS).map(|point| low + (high - low) * point as f64 / (POINTS - 1) as f64).collect()
     };

@@ -29,8 +29,9 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    /// `[course][candidate]`: the first candidate is the base, candidate j + 1 has slot j moved by `steps[j]`.
-    pub fn new(residuals: &[&[Residual]], steps: &[f64]) -> Self {
+    /// `[course][candidate]`: the first candidate has these gains, candidate j + 1 has slot j moved by its difference step.
+    pub fn around(group: &Group<'_>, gains: &[Gains], residuals: &[&[Residual]]) -> Self {
+        let steps = difference_steps(group, gains);
         let count = steps.len();
         let mut blocks = Vec::new();
         for course in residuals {
@@ -39,7 +40,7 @@ impl Normal {
             let weight = 1.0 / (ticks * residuals.len()) as f64;
             let length = ((BLOCK_S / base.period_s) as usize).max(1) * base.components;
             for start in (0..base.of.len()).step_by(length) {
-                blocks.push(block(course, steps, start..(start + length).min(base.of.len()), weight));
+                blocks.push(block(course, &steps, start..(start + length).min(base.of.len()), weight));
             }
         }
         Self { count, blocks }
@@ -139,8 +140,9 @@ impl Step {
     }
 
     /// The step that makes ½ d'Hd + g'd least inside the bounds: coordinate by coordinate, which converges for a convex problem.
-    pub fn solve(&self, square: &[f64], slope: &[f64]) -> Vec<f64> {
+    pub fn solve(&self, normal: &Normal) -> Vec<f64> {
         let count = self.count;
+        let (square, slope) = normal.sums();
         let mut step = vec![0.0; count];
         for _ in 0..SWEEPS {
             let mut moved = 0.0_f64;

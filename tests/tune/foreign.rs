@@ -145,10 +145,8 @@ fn two_axes_of_another_plant_are_tuned_together_from_their_traces() {
             println!(
                 "{objective:?} {program}: contour and deviation {before:?} mm before, {after:?} mm after, {gains:?}"
             );
-            assert!(after[0] <= 1.02 * before[0], "{objective:?} {program}: contour {before:?} {after:?}, {gains:?}");
-            if objective == Objective::Deviation {
-                assert!(after[1] < 0.7 * before[1], "{program}: deviation {before:?} {after:?}, {gains:?}");
-            }
+            assert!(after[0] < 0.8 * before[0], "{objective:?} {program}: contour {before:?} {after:?}, {gains:?}");
+            assert!(after[1] < 0.8 * before[1], "{objective:?} {program}: deviation {before:?} {after:?}, {gains:?}");
         }
         // What the trace foresees is near what the plant does.
         let foreseen = found.courses[0].contour_mm[1].rms;

@@ -61,6 +61,16 @@ fn machines_out_of_the_ordinary_get_better_on_both_programs() {
 }
 
 #[test]
+fn a_late_feed_forward_has_room_for_its_delay() {
+    // A cycle of 2 ms, and feed-forward that waits 2 ms: theory asks for about 4 ms, where the usual bound is.
+    let loaded = load("mikron_ucp710", &[]).unwrap();
+    let text = "G17 G71 G90 G642 CTOL=0.02\nG1 X20 A10 C40 F3000\nX0 A-5 C0\nA5 X10 Y5\nX0 Y0 A0\nM30\n";
+    let found = tuned(&loaded, vec![course(&loaded, "t.mpf", text, false)], &TuneOptions::default());
+    let delay = found.axes[0].gains.iter().find(|one| one.gain == Gain::Delay).unwrap();
+    assert!((3.8..4.6).contains(&delay.value) && !delay.at_bound, "{delay:?}");
+}
+
+#[test]
 fn gains_that_are_best_already_are_kept_and_their_intervals_hold_them() {
     let mut sets = Vec::new();
     for axis in ["X", "Y", "Z"] {
