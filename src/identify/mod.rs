@@ -32,6 +32,7 @@ mod write;
 
 pub use axis::{IdentifyOptions, identify};
 pub use control::{Agreement, ControlEstimate, ControlResult, FeedOverPath, TracedProgram, calibrate};
+pub(crate) use normal::student_t;
 pub use plan::{PLANNED_SIGNALS, PlannedProgram, PlannedSignal, plan};
 pub use wire::{AxisResult, Estimate, Figure, Means, Parameter, Refusal, TorqueSource};
 pub use write::machine_text;
