@@ -197,7 +197,7 @@ fn velocity_feedforward(records: &[AxisRecord], found: &mut Vec<Estimate>, resul
         }
         return;
     };
-    gain_and_delay(&lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found);
+    gain_and_delay(&lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found, result);
 }
 
 /// The two lags of a signal of the set-point.
@@ -216,9 +216,21 @@ fn fits(lagged: &Lagged, what: &str, result: &mut AxisResult) -> bool {
 }
 
 /// Sum of two lags, and their centre of mass as a delay.
-fn gain_and_delay(lagged: &Lagged, period_s: f64, gain: Parameter, scale: f64, found: &mut Vec<Estimate>) {
+fn gain_and_delay(
+    lagged: &Lagged,
+    period_s: f64,
+    gain: Parameter,
+    scale: f64,
+    found: &mut Vec<Estimate>,
+    result: &mut AxisResult,
+) {
     let (value, half) = lagged.solution.function(0, |theta| theta[0] + theta[1]);
     found.push(Estimate::around(gain, value, half, Means::Lags).scaled(scale));
+    if value.abs() <= half {
+        let reason = "the feed-forward is as good as none in this trace: nothing is delayed";
+        result.refuse(Parameter::FeedforwardDelay, reason, "record with FFWON");
+        return;
+    }
     if found.iter().all(|known| known.parameter != Parameter::FeedforwardDelay) {
         let lag = lagged.n as f64;
         let (share, half) = lagged.solution.function(1, |theta| theta[1] / (theta[0] + theta[1]));
@@ -244,7 +256,7 @@ fn torque_feedforward(records: &[AxisRecord], data: &DriveData, found: &mut Vec<
     match best_lag(records, response, regressors).filter(|lagged| fits(lagged, "torque feed-forward", result)) {
         Some(lagged) if inertia > 0.0 => {
             let scale = data.mechanics.transmission_lu_per_rad / inertia;
-            gain_and_delay(&lagged, records[0].period_s, Parameter::TorqueFeedforward, scale, found);
+            gain_and_delay(&lagged, records[0].period_s, Parameter::TorqueFeedforward, scale, found, result);
             result.verdicts.push(format!(
                 "torque feed-forward: the trace tells weight times inertia; the weight is given for the inertia {inertia} of the machine file"
             ));
@@ -261,6 +273,9 @@ fn torque_feedforward(records: &[AxisRecord], data: &DriveData, found: &mut Vec<
         ),
     }
 }
+
+/// A set-point delay whose interval is wider to each side is none.
+const DELAY_WIDE_CYCLES: f64 = 0.5;
 
 fn setpoint_delay(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mut AxisResult) {
     if !have(records, |record| &record.reference_lu) {
@@ -286,6 +301,12 @@ fn setpoint_delay(records: &[AxisRecord], found: &mut Vec<Estimate>, result: &mu
     let step = rms_step(records);
     let (share, half) = lagged.solution.function(0, |theta| -theta[0]);
     let period_s = records[0].period_s;
+    if half > DELAY_WIDE_CYCLES {
+        let reason =
+            format!("the reference hardly follows the set-point: the delay is known to ±{half:.1} cycles only");
+        result.refuse(Parameter::SetpointDelay, reason, "record a longer motion with the control deviation");
+        return;
+    }
     let delay = Estimate::around(Parameter::SetpointDelay, (lagged.n as f64 + share).max(0.0), half, Means::Lags);
     found.push(delay.scaled(period_s));
     // What a wrong shape leaves over is some share of the way of a cycle.
@@ -361,7 +382,7 @@ fn position_gain(records: &[AxisRecord], data: &DriveData, found: &mut Vec<Estim
     };
     let lagged = best_lag(records, response, regressors);
     if let Some(lagged) = &lagged {
-        gain_and_delay(lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found);
+        gain_and_delay(lagged, records[0].period_s, Parameter::VelocityFeedforward, 1.0, found, result);
         let mut solution = lagged.solution.clone();
         // The gain stands in the third column here.
         solution.theta = solution.theta.rows(2, 1).into_owned();
@@ -392,9 +413,10 @@ fn push_gain(solution: Option<&Solution>, found: &mut Vec<Estimate>, result: &mu
 fn lags(records: &[AxisRecord], axis: &Axis, result: &mut AxisResult) {
     if have(records, |record| &record.filtered_velocity_lu_s) {
         let response = |record: &AxisRecord, k: usize| at(&record.filtered_velocity_lu_s, k);
-        if let Some((gain, taps_s, share)) = taps(records, response) {
-            // A difference of two set-points is half a cycle late itself.
-            let delay_s = taps_s + records[0].period_s / 2.0;
+        // A difference of two set-points is half a cycle late itself; what is no later than that is no filter.
+        let late = |(gain, taps_s, share): (f64, f64, f64)| (gain, taps_s + records[0].period_s / 2.0, share);
+        let filter = taps(records, response).map(late).filter(|filter| filter.1 > FILTER_MIN_S);
+        if let Some((gain, delay_s, share)) = filter {
             result.figures.push(Figure {
                 key: "setpoint_filter_delay_ms",
                 title: "delay of the set-point speed at the controller's input behind the set-point (a filter)"
@@ -431,6 +453,9 @@ fn lags(records: &[AxisRecord], axis: &Axis, result: &mut AxisResult) {
         result.figures.push(Figure { key: "position_lag_ms", title: title.to_owned(), value, unit: "ms" });
     }
 }
+
+/// A shorter delay is none.
+const FILTER_MIN_S: f64 = 5e-5;
 
 /// A filter of the set-point speed as taps: gain, mean delay, share left over.
 fn taps(records: &[AxisRecord], response: impl Fn(&AxisRecord, usize) -> f64) -> Option<(f64, f64, f64)> {

@@ -106,7 +106,11 @@ const CIRCLE_SHARE: f64 = 0.25;
 pub fn plan(machine: &Machine, axes: &[crate::base::AxisId]) -> Vec<PlannedProgram> {
     let chosen: Vec<&Axis> =
         machine.axis_ids().filter(|id| axes.is_empty() || axes.contains(id)).map(|id| machine.axis(id)).collect();
-    let mut programs: Vec<PlannedProgram> = chosen.iter().map(|axis| of_axis(machine, axis)).collect();
+    let mut programs: Vec<PlannedProgram> = chosen
+        .iter()
+        .filter(|axis| !axes.is_empty() || axis.drive.is_some())
+        .map(|axis| of_axis(machine, axis))
+        .collect();
     let linear: Vec<&Axis> = chosen.iter().copied().filter(|axis| axis.kind == AxisKind::Linear).collect();
     let plane = |one: &str, other: &str| {
         let find = |name: &str| linear.iter().copied().find(|axis| axis.name == name);

@@ -15,8 +15,14 @@ use std::sync::Arc;
 
 /// Stretches of a path.
 pub(super) const CELLS: usize = 3000;
+/// Stretches that a speed is the mean of: in one alone the grain of the set-points is seen.
+const FEW: usize = 5;
+/// Stretches of it in a picture.
+const DRAWN: usize = 750;
 /// Set-points at most: five hours at 1 ms.
 const SETPOINTS_MAX: usize = 20_000_000;
+/// A program that goes on longer outside of its trace is endless.
+const ENDLESS_S: f64 = 3600.0;
 /// A step below this is standstill.
 const STEP_MIN_MM: f64 = 1e-7;
 
@@ -116,15 +122,19 @@ impl PathProfile {
         Some(profile)
     }
 
-    /// Of a program as this machine plans it; `None` after an alarm.
-    pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId]) -> Option<Self> {
+    /// Of a program as this machine plans it; `None` after an alarm, and where it goes on for an hour and four times as long as the trace did.
+    pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId], traced_s: f64) -> Option<Self> {
         let mut kernel = Kernel::new(machine.clone(), setup.clone(), false);
         let period_s = machine.cycle.time_base.seconds(machine.cycle.time_base.ticks_per_setpoint());
         let mut places = Vec::new();
         let (mut feed_sum, mut feed_count) = (0.0, 0.0_f64);
         // Until the program says otherwise all of it is.
         let mut traced = true;
-        loop {
+        let cycles_max = ((ENDLESS_S + 4.0 * traced_s) / period_s) as usize;
+        for cycle in 0.. {
+            if cycle > cycles_max || places.len() > SETPOINTS_MAX {
+                return None;
+            }
             let status = kernel.cycle().ok()?;
             for event in kernel.output().begun.iter().flat_map(|begun| &begun.events) {
                 let Event::Trace(starts) = event else { continue };
@@ -149,9 +159,6 @@ impl PathProfile {
             }
             if status == Status::Finished {
                 break;
-            }
-            if places.len() > SETPOINTS_MAX {
-                return None;
             }
         }
         Self::of(&places, period_s, feed_sum / feed_count.max(1.0))
@@ -187,6 +194,20 @@ impl PathProfile {
         Some(Self { places_mm: borders, feeds_mm_s, length_mm, time_s, programmed_mm_s })
     }
 
+    /// Highest speed of each axis, as means of [`FEW`] stretches; nothing without a path.
+    pub(super) fn speeds_mm_s(&self) -> Vec<f64> {
+        let columns = self.places_mm.first().map_or(0, Vec::len);
+        let cell_mm = self.length_mm / CELLS as f64;
+        let mut speeds = vec![0.0_f64; columns];
+        for (places, feeds) in self.places_mm.windows(FEW + 1).zip(self.feeds_mm_s.windows(FEW)) {
+            let time_s: f64 = feeds.iter().map(|feed| cell_mm / feed).sum();
+            for (column, speed) in speeds.iter_mut().enumerate() {
+                *speed = speed.max((places[FEW][column] - places[0][column]).abs() / time_s);
+            }
+        }
+        speeds
+    }
+
     /// Sideways distances from `reference` at equal shares of the path, one vector a border.
     pub(super) fn sideways_mm(&self, reference: &Self) -> Vec<f64> {
         if self.places_mm.is_empty() || reference.places_mm.is_empty() {
@@ -205,6 +226,13 @@ impl PathProfile {
             all.extend(off.iter().zip(&tangent).map(|(d, t)| d - along * t / size));
         }
         all
+    }
+
+    /// Mean feeds of [`DRAWN`] stretches, for a picture.
+    pub(super) fn coarse_feeds_mm_s(&self) -> Vec<f64> {
+        // Equal ways: the mean feed is the harmonic one.
+        let mean = |feeds: &[f64]| feeds.len() as f64 / feeds.iter().map(|feed| 1.0 / feed.max(1e-9)).sum::<f64>();
+        self.feeds_mm_s.chunks(CELLS / DRAWN).map(mean).collect()
     }
 
     /// RMS of the differences of feed over the path.

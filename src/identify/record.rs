@@ -9,6 +9,7 @@ use crate::base::units::rad_from_deg;
 use crate::base::{AxisKind, Diagnostic};
 use crate::machine::{Axis, DriveData};
 use crate::trace::{Clock, Method, Signal, TimeGrid, Trace};
+use std::f64::consts::TAU;
 
 /// Samples of one axis at its position cycle (or at the slower cycle of the trace).
 #[derive(Clone, Debug)]
@@ -41,6 +42,33 @@ pub(super) struct AxisRecord {
     pub(super) torque: Option<Torque>,
     /// Rows as fast as the speed loop.
     pub(super) fine: Option<FineRecord>,
+}
+
+impl AxisRecord {
+    /// Set-point, position and torque from a row on: what a simulation is held against.
+    pub(super) fn simulated_from(&self, row: usize) -> Self {
+        let cut = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[row.min(values.len())..].to_vec());
+        let torque = |torque: &Torque| {
+            let from = row.min(torque.values_n_m.len());
+            Torque { values_n_m: torque.values_n_m[from..].to_vec(), source: torque.source }
+        };
+        Self {
+            period_s: self.period_s,
+            count: self.count.saturating_sub(row),
+            setpoint_lu: cut(&self.setpoint_lu),
+            position_lu: cut(&self.position_lu),
+            position_from: self.position_from,
+            reference_lu: None,
+            deviation_lu: None,
+            following_lu: None,
+            velocity_feedforward_lu_s: None,
+            velocity_command_lu_s: None,
+            filtered_velocity_lu_s: None,
+            torque_feedforward_n_m: None,
+            torque: self.torque.as_ref().map(torque),
+            fine: None,
+        }
+    }
 }
 
 /// Torque of the motor, row by row.
@@ -97,7 +125,23 @@ impl Reader<'_> {
         if self.axis.kind == AxisKind::Rotary {
             values.iter_mut().for_each(|value| *value = rad_from_deg(*value));
         }
+        if self.axis.modulo && stem.starts_with("position_") {
+            unwrap(&mut values);
+        }
         Some(values)
+    }
+}
+
+/// A modulo axis goes on behind 360 deg instead of beginning again.
+fn unwrap(angles_rad: &mut [f64]) {
+    let (mut turns, mut before) = (0.0, f64::NAN);
+    for angle_rad in angles_rad.iter_mut().filter(|angle| angle.is_finite()) {
+        let raw_rad = *angle_rad;
+        if before.is_finite() {
+            turns -= ((raw_rad - before) / TAU).round();
+        }
+        before = raw_rad;
+        *angle_rad = raw_rad + turns * TAU;
     }
 }
 

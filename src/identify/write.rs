@@ -24,6 +24,15 @@ pub fn machine_text(text: &str, machine: &Machine, results: &[AxisResult]) -> Re
                 format!("identified, 95 %: {} to {}", shown(estimate.low, estimate), shown(estimate.high, estimate));
             put(&mut document, &key, Value::from(value), &comment).ok_or_else(|| fault(&key))?;
         }
+        if let Some(coulomb) = result.estimate(Parameter::Coulomb) {
+            let key = format!("axes.{}.{}", axis.name, Parameter::Coulomb.key(axis).replace("coulomb", "breakaway"));
+            let before = axis.drive.as_ref().map(|drive| drive.mechanics.breakaway_friction_n_m);
+            // Where the file has none it follows by itself.
+            if holds(&document, &key) && before.is_some_and(|before| before < rounded(coulomb)) {
+                let comment = "raised: it is not below the Coulomb friction that was identified";
+                put(&mut document, &key, Value::from(rounded(coulomb)), comment).ok_or_else(|| fault(&key))?;
+            }
+        }
         let whole = [Parameter::Inertia, Parameter::Viscous, Parameter::Coulomb];
         if whole.iter().all(|parameter| result.estimate(*parameter).is_some()) {
             let key = format!("axes.{}.drive.identified", axis.name);
@@ -44,11 +53,25 @@ fn decimals(estimate: &Estimate) -> i32 {
 
 /// The value as it goes into a file.
 fn rounded(estimate: &Estimate) -> f64 {
-    format!("{:.*}", decimals(estimate) as usize, estimate.value).parse().unwrap_or(estimate.value)
+    let value = format!("{:.*}", decimals(estimate) as usize, estimate.value).parse().unwrap_or(estimate.value);
+    match estimate.parameter {
+        Parameter::Gravity | Parameter::GravitySin | Parameter::GravityCos => value,
+        // Nothing else is negative: an estimate a little below 0 is none. (The sum makes 0 of -0.)
+        _ => f64::max(value, 0.0) + 0.0,
+    }
 }
 
 fn shown(value: f64, estimate: &Estimate) -> String {
     format!("{:.*}", decimals(estimate) as usize, value)
+}
+
+/// Whether the file has a dotted key.
+fn holds(document: &DocumentMut, key: &str) -> bool {
+    let mut item = Some(document.as_item());
+    for part in key.split('.') {
+        item = item.and_then(|item| item.get(part));
+    }
+    item.is_some()
 }
 
 /// Sets one dotted key; a table that is missing is made.

@@ -90,6 +90,57 @@ fn without_the_feedforward_signal_gain_and_feedforward_are_found_together() {
 }
 
 #[test]
+fn a_feedforward_that_is_off_is_written_as_none_and_has_no_delay() {
+    let stems = ["position_setpoint", "position_measured", "control_deviation", "velocity_command", "current_mean"];
+    let result = of(&legs(), &stems, &["axes.X.drive.velocity_feedforward=0"]);
+    let gain = result.estimate(Parameter::VelocityFeedforward).unwrap_or_else(|| panic!("{:?}", result.refusals));
+    assert!(gain.value.abs() < 1e-3, "{gain:?}");
+    assert!(
+        result.refusal(Parameter::FeedforwardDelay).is_some(),
+        "{:?}",
+        result.estimate(Parameter::FeedforwardDelay)
+    );
+    // A file whose breakaway friction is lower than the Coulomb friction that was found takes the values all the same.
+    let machine = machine("spinner_mvc850", &[]);
+    let text = include_str!("../../machines/spinner_mvc850.toml");
+    let low =
+        text.replacen("coulomb_friction_n_m = ", "breakaway_friction_n_m = 0.3\ncoulomb_friction_n_m = 0.3 # ", 1);
+    let source = |text: &str| sollwert::base::SourceText::new("machine.toml".to_owned(), text);
+    let before = sollwert::machine::parse(&source(&low), &[]).expect("a machine");
+    assert_eq!(before.machine.name, machine.name);
+    let written = machine_text(&low, &before.machine, std::slice::from_ref(&result)).expect("tables take values");
+    assert!(sollwert::machine::parse(&source(&written), &[]).is_ok(), "{written}");
+}
+
+#[test]
+fn a_modulo_axis_that_passes_360_deg_is_identified() {
+    let machine = machine("mikron_ucp710", &["axes.C.modulo=true"]);
+    let axis = machine.axis(machine.axis_by_name("C").unwrap());
+    let cycle_s = machine.cycle.time_base.seconds(axis.drive.as_ref().unwrap().position_cycle_ticks);
+    let scale = axis.limits.velocity_max_lu_s / 333.3;
+    let scaled: Vec<(f64, f64, f64)> =
+        legs().iter().map(|(way, speed, a)| (way * scale * 4.0, speed * scale, a * scale)).collect();
+    let noise = Noise { scale_lu: 5e-6, ..Noise::usual(5) };
+    let mut setpoints = moves(cycle_s, &scaled);
+    // In the middle of the motion zero is passed, again and again.
+    let start = sollwert::base::units::rad_from_deg(350.0);
+    setpoints.iter_mut().for_each(|x| *x += start);
+    let signals = simulate(axis, &machine.cycle.time_base, &setpoints, noise.scale_lu);
+    let mut wrapped = trace(axis, cycle_s, &signals, &ALL, noise);
+    for signal in &mut wrapped.signals {
+        if signal.name.as_deref().is_some_and(|name| name.contains("position_")) {
+            signal.values.iter_mut().for_each(|value| *value = value.rem_euclid(360.0));
+        }
+    }
+    let options = IdentifyOptions { axes: Vec::new(), linear_only: true };
+    let result = identify(&[wrapped], &machine, &options, &mut |_| {}).expect("one axis").remove(0);
+    let mechanics = &axis.drive.as_ref().unwrap().mechanics;
+    let inertia = result.estimate(Parameter::Inertia).unwrap_or_else(|| panic!("{:?}", result.refusals));
+    assert!((inertia.value / mechanics.inertia_kg_m2 - 1.0).abs() < 0.01, "{inertia:?}");
+    assert!(result.estimate(Parameter::SetpointDelay).is_some(), "{:?}", result.refusals);
+}
+
+#[test]
 fn a_machine_file_keeps_comments_and_order() {
     let result = of(&legs(), &ALL, &[]);
     let machine = machine("spinner_mvc850", &[]);
