@@ -66,7 +66,7 @@ impl Reversal {
         } else if a <= a2 {
             most
         } else if a < a3 {
-            (most * (1.0 - (a - a2) / (a3 - a2))).max(lowest_lu_s)
+            most + (lowest_lu_s - most) * ((a - a2) / (a3 - a2))
         } else {
             lowest_lu_s
         }

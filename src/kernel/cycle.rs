@@ -15,7 +15,9 @@ use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
 use crate::drive::{AxisSignals, Drive, DriveBatch, DriveInput, IdealDrive, SpindleLag, SpindleSignals, Start};
 use crate::feed::{Limit, LimitKind};
-use crate::interpolator::{AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint};
+use crate::interpolator::{
+    AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint, SpindleSetpoint,
+};
 use crate::interpreter::{ExactStop, Setup};
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::machine::{Axis, Machine};
@@ -371,6 +373,11 @@ impl<S: PieceSource> Kernel<S> {
         if self.drives.has_cascade() {
             self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
         }
+    }
+
+    /// The spindle one t_s later.
+    pub(super) fn step_spindle(&mut self, setpoint: &SpindleSetpoint) {
+        self.output.spindle = self.spindle.step(setpoint);
     }
 
     /// The drives, for [`braking`](super::braking).

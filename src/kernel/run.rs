@@ -159,7 +159,7 @@ fn record_stop<S: PieceSource>(
     let Some(mut braking) = kernel.brake() else { return Ok(()) };
     loop {
         let goes_on = kernel.brake_on(&mut braking);
-        record_braking(recorder, kernel.output()).map_err(RunError)?;
+        record_braking(recorder, kernel.machine(), kernel.output()).map_err(RunError)?;
         if !goes_on {
             return Ok(());
         }
