@@ -109,14 +109,15 @@ impl Ramp {
         let least_rad_s = CYCLES_MIN * setpoint_period_s * self.acceleration_rad_s2;
         let sense = self.change_rad_s().signum();
         let (mut now_rad_s, mut levels) = (self.speed_rad_s, Vec::new());
-        // Half a step before the end none begins any more.
         while levels.len() < STRETCHES_MAX {
             levels.push(self.angle_rad(now_rad_s));
             let step_rad_s = (STEP_SHARE * now_rad_s).max(least_rad_s);
-            now_rad_s += sense * step_rad_s;
-            if sense * (self.target_rad_s - now_rad_s) < 0.5 * step_rad_s {
+            let left_rad_s = sense * (self.target_rad_s - now_rad_s);
+            if left_rad_s <= step_rad_s {
                 break;
             }
+            // The last two are alike.
+            now_rad_s += sense * if left_rad_s < 2.0 * step_rad_s { 0.5 * left_rad_s } else { step_rad_s };
         }
         levels.push(self.angle_rad(self.target_rad_s));
         levels
