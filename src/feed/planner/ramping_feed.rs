@@ -3,11 +3,9 @@
 //! In: pieces with G95 behind a rest of the path, the ramp of the spindle. Out: the same pieces in stretches, each with F times the mean speed of the spindle over it.
 //!
 //! From a rest on the time is known, and with it the angle that the spindle has turned through wherever the path is, if the path keeps to F: at the angle θ
-//! behind the rest the speed is `n(θ)² = n0² + 2 α θ`. The ramp is cut where the speed has changed by [`STEP_SHARE`] of itself (by more
-//! where a stretch would take less than [`CYCLES_MIN`] cycles: near the rest of a spindle), so that the feed is off by half of that; each stretch takes
-//! the time that the spindle takes for its angle. The path accelerates from
-//! rest first: the first stretch holds that way whole, and the ramp counts from the speed that the spindle has by its end. From stretch to stretch the
-//! axes have their jerk limits, which makes the path late by a few milliseconds in all.
+//! behind the rest the speed is `n(θ)² = n0² + 2 α θ`. The ramp is cut where the speed has changed by [`STEP_SHARE`] of the one that it goes to (by more
+//! where a stretch would take less than [`CYCLES_MIN`] cycles), so that the feed is off by half of that. The path accelerates from
+//! rest first: the first stretch holds that way whole, and the ramp counts from the speed that the spindle has by its end.
 //! With the next rest, or another unit of F, it ends, and a rest begins it anew. Blends have one feed.
 //! The set-point of the speed counts, not the actual one, which is `lag_ms` later. Under G96 F is that of the wanted speed.
 
@@ -18,11 +16,8 @@ use crate::kinematics::JointPath;
 use crate::machine::AxisLimits;
 use crate::smoothing::PieceKind;
 
-/// Change of the speed over a stretch, as a share of it.
+/// Change of the speed over a stretch, as a share of the speed that the ramp goes to.
 const STEP_SHARE: f64 = 0.01;
-
-/// Stretches of a ramp at most. Some hundred below the speed at which a share takes a few cycles, and 230 for each decade above it.
-const STRETCHES_MAX: usize = 4000;
 
 /// Cycles that a stretch takes at least.
 const CYCLES_MIN: f64 = 4.0;
@@ -85,42 +80,19 @@ impl Ramp {
         square.max(0.0).sqrt()
     }
 
-    /// When it has turned by an angle, counted from where it begins.
-    fn time_s(&self, angle_rad: f64) -> f64 {
-        let end_rad = self.angle_rad(self.target_rad_s);
-        let ramp_s =
-            (self.speed_at_rad_s(angle_rad.clamp(0.0, end_rad)) - self.speed_rad_s).abs() / self.acceleration_rad_s2;
-        ramp_s + (angle_rad - end_rad).max(0.0) / self.target_rad_s
-    }
-
-    /// Mean speed between two angles. Over the way on which the path comes to speed it is the one at its end.
-    fn mean_rad_s(&self, from_rad: f64, to_rad: f64) -> f64 {
-        let from_rad = from_rad.max(0.0);
-        let time_s = self.time_s(to_rad) - self.time_s(from_rad);
-        if time_s > 0.0 {
-            (to_rad - from_rad) / time_s
-        } else {
-            self.speed_at_rad_s(to_rad.clamp(0.0, self.angle_rad(self.target_rad_s)))
-        }
-    }
-
-    /// Angles at which stretches begin; the last one is the end.
-    fn levels(&self, setpoint_period_s: f64) -> Vec<f64> {
-        let least_rad_s = CYCLES_MIN * setpoint_period_s * self.acceleration_rad_s2;
-        let sense = self.change_rad_s().signum();
-        let (mut now_rad_s, mut levels) = (self.speed_rad_s, Vec::new());
-        while levels.len() < STRETCHES_MAX {
-            levels.push(self.angle_rad(now_rad_s));
-            let step_rad_s = (STEP_SHARE * now_rad_s).max(least_rad_s);
-            let left_rad_s = sense * (self.target_rad_s - now_rad_s);
-            if left_rad_s <= step_rad_s {
-                break;
-            }
-            // The last two are alike.
-            now_rad_s += sense * if left_rad_s < 2.0 * step_rad_s { 0.5 * left_rad_s } else { step_rad_s };
-        }
-        levels.push(self.angle_rad(self.target_rad_s));
-        levels
+    /// Angles at which stretches begin, with the speed that counts from there on; the last one is the end.
+    fn levels(&self, setpoint_period_s: f64) -> Vec<(f64, f64)> {
+        let change_rad_s = self.change_rad_s();
+        let least_rad_s =
+            (STEP_SHARE * self.target_rad_s).max(CYCLES_MIN * setpoint_period_s * self.acceleration_rad_s2);
+        // At most 1 / STEP_SHARE for a rise; a fall from far above is bounded too.
+        let steps = (change_rad_s.abs() / least_rad_s).ceil().clamp(1.0, 1000.0) as u32;
+        let step_rad_s = change_rad_s / f64::from(steps);
+        let level = |step: u32| {
+            let from_rad_s = self.speed_rad_s + f64::from(step) * step_rad_s;
+            (self.angle_rad(from_rad_s), from_rad_s + step_rad_s / 2.0)
+        };
+        (0..steps).map(level).chain([(self.angle_rad(self.target_rad_s), self.target_rad_s)]).collect()
     }
 }
 
@@ -227,30 +199,35 @@ fn cut(path: JointPath, ramp: &Ramp, from_rad: f64, lead_lu_rad: f64, setpoint_p
         path
     };
     let end_rad = from_rad + length_lu / lead_lu_rad;
+    let whole = |path| {
+        let [first, last] =
+            [from_rad, end_rad].map(|at| ramp.speed_at_rad_s(at.clamp(0.0, ramp.angle_rad(ramp.target_rad_s))));
+        vec![stretch(path, 0.5 * (first + last))]
+    };
     if !matches!(path.contour.kind, PieceKind::Block(_)) {
-        return vec![stretch(path, ramp.mean_rad_s(from_rad, end_rad))];
+        return whole(path);
     }
+    let room_rad = CYCLES_MIN * setpoint_period_s * ramp.target_rad_s;
     let levels = ramp.levels(setpoint_period_s);
-    let before = levels.partition_point(|angle_rad| *angle_rad <= from_rad).saturating_sub(1);
-    let mut borders_rad = vec![from_rad];
-    for angle_rad in levels[before..].iter().skip(1) {
-        let speed_rad_s = ramp.speed_at_rad_s(*angle_rad);
+    let before = levels.partition_point(|(angle_rad, _)| *angle_rad <= from_rad).saturating_sub(1);
+    let mut borders: Vec<(f64, f64)> = Vec::new();
+    for (angle_rad, speed_rad_s) in &levels[before..] {
+        let from_lu = if borders.is_empty() { 0.0 } else { (angle_rad - from_rad) * lead_lu_rad };
         // Too near to the end it is not worth a stretch of its own.
-        let room_rad = (CYCLES_MIN * setpoint_period_s * speed_rad_s).min(0.5 * (end_rad - from_rad));
-        if *angle_rad > from_rad && *angle_rad + room_rad < end_rad {
-            borders_rad.push(*angle_rad);
+        if borders.is_empty() || *angle_rad + room_rad.min(0.5 * (end_rad - from_rad)) < end_rad {
+            borders.push((from_lu, *speed_rad_s));
         }
     }
-    if borders_rad.len() < 2 {
-        return vec![stretch(path, ramp.mean_rad_s(from_rad, end_rad))];
+    if borders.len() < 2 {
+        let speed_rad_s = borders.first().map_or(ramp.target_rad_s, |(_, speed_rad_s)| *speed_rad_s);
+        return vec![stretch(path, speed_rad_s)];
     }
-    let ends_rad = borders_rad.iter().skip(1).copied().chain([end_rad]);
-    let place_lu = |angle_rad: f64| if angle_rad == end_rad { length_lu } else { (angle_rad - from_rad) * lead_lu_rad };
-    let part = |(from, to): (&f64, f64)| Part {
-        path: stretch(split::cut(&path, place_lu(*from), place_lu(to)), ramp.mean_rad_s(*from, to)),
+    let ends = borders.iter().skip(1).map(|(from_lu, _)| *from_lu).chain([length_lu]);
+    let part = |((from_lu, speed_rad_s), end_lu): (&(f64, f64), f64)| Part {
+        path: stretch(split::cut(&path, *from_lu, end_lu), *speed_rad_s),
         worst: None,
     };
-    let parts = borders_rad.iter().zip(ends_rad).map(part).collect();
+    let parts = borders.iter().zip(ends).map(part).collect();
     split::named(parts, &path.contour, length_lu).into_iter().map(|part| part.path).collect()
 }
 
