@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Deviations of another plant than the one that is believed, for tests/tune: a load behind a spring with play, and Stribeck friction.
 
-Goes in: the machine class MVC850, axis X, as models/drive.md has it for the controllers (section 4); the plant is another one. Comes out:
-tests/tune/other_plant.csv (set-points and control deviation with the gains before, two programs) and tests/tune/other_plant_gains.csv (RMS of
-the deviation for a grid of gains: the deviation is nearly affine in them, so that a test reads any gains off it). The plant is integrated
-with the fourth-order Runge-Kutta method in steps of 6.25 us, friction is a smooth function of speed. Nothing is shared with the Rust code.
+Goes in: the machine class MVC850, axes X and Y, as models/drive.md has them for the controllers (section 4); the plants are other ones. Comes
+out: tests/tune/other_plant.csv (set-points and control deviation of X with the gains before, two programs), tests/tune/other_plant_gains.csv
+(RMS of the deviation for a grid of gains: the deviation is nearly affine in them, so that a test reads any gains off it) and
+tests/tune/other_plant_xy.csv (paths in X and Y with the deviations of both). The plant is integrated with the fourth-order Runge-Kutta method
+in steps of 6.25 us, friction is a smooth function of speed. Nothing is shared with the Rust code; tests/tune/foreign.rs has the plant once
+more, held against these files, for gains that are not known beforehand.
 
     python3 -m venv .venv && .venv/bin/pip install numpy numba
     .venv/bin/python tools/tune_reference.py
@@ -20,12 +22,15 @@ TP, NV, NI, TI = 1e-3, 8, 2, 62.5e-6  # 8 speed cycles in a position cycle, 2 cu
 SUB = 10
 R_LU = 12 / math.tau
 KT, KE, R, L = 1.30, .43, .75, 6.5e-3
-KV, KP, TN, KPI, TNI = 50.0, 2.0, .010, 22.0, 2e-3
+KV, KPI, TNI = 50.0, 22.0, 2e-3
 UMAX, IMAX = 245.0, 28.0
-JFF = .0085  # what the feed-forward believes
-# The plant: inertias of motor and load, spring, damping, play; Coulomb, viscous, share above Coulomb at rest, Stribeck speed.
-JM, JL, C, D, PLAY = .0060, .0035, 2000.0, .25, .0008
-TC, B, OVER, WS = .75, .011, .35, 6.0
+# Controllers: gain and time of the speed loop, inertia that the feed-forward believes.
+CONTROL = {"X": (2.0, .010, .0085), "Y": (2.2, .011, .011)}
+# Plants: inertias of motor and load, spring, damping, play; Coulomb, viscous, share above Coulomb at rest, Stribeck speed.
+PLANT = {
+    "X": (.0060, .0035, 2000.0, .25, .0008, .75, .011, .35, 6.0),
+    "Y": (.0065, .0060, 2600.0, .40, .0012, 1.35, .016, .25, 8.0),
+}
 SCALE_MM = 1e-3
 BEFORE = (1.0, 0.0, 1.2e-3)
 VELOCITY, TORQUE, DELAY_MS = (.985, 1.0, 1.015), (0.0, .75, 1.5), (.4, .7, 1.0, 1.3, 1.6)
@@ -61,7 +66,8 @@ def profile(moves):
 
 
 @njit
-def slope(i, wm, tm, wl, tl, u):
+def slope(i, wm, tm, wl, tl, u, plant):
+    JM, JL, C, D, PLAY, TC, B, OVER, WS = plant
     twist = tm - tl
     s = 0.0
     if twist > PLAY / 2:
@@ -73,7 +79,8 @@ def slope(i, wm, tm, wl, tl, u):
 
 
 @njit
-def deviation(xset, velocity, torque, delay):
+def deviation(xset, velocity, torque, delay, control, plant):
+    KP, TN, JFF = control
     out = np.zeros(len(xset))
     y = np.zeros(5)
     iv = ii = v_before = 0.0
@@ -104,15 +111,39 @@ def deviation(xset, velocity, torque, delay):
                 if u == un or ei * un < 0:
                     ii += dv
                 for _ in range(SUB):
-                    k1 = slope(y[0], y[1], y[2], y[3], y[4], u)
+                    k1 = slope(y[0], y[1], y[2], y[3], y[4], u, plant)
                     p = y + h / 2 * k1
-                    k2 = slope(p[0], p[1], p[2], p[3], p[4], u)
+                    k2 = slope(p[0], p[1], p[2], p[3], p[4], u, plant)
                     p = y + h / 2 * k2
-                    k3 = slope(p[0], p[1], p[2], p[3], p[4], u)
+                    k3 = slope(p[0], p[1], p[2], p[3], p[4], u, plant)
                     p = y + h * k3
-                    k4 = slope(p[0], p[1], p[2], p[3], p[4], u)
+                    k4 = slope(p[0], p[1], p[2], p[3], p[4], u, plant)
                     y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     return out
+
+
+# Paths: lines by their end, circles by radius and sense; speed mm/s and peak acceleration mm/s2 along the path.
+PATHS = {
+    "seen": [("circle", 12, 1, 100, 900), ("line", (10, 6), 80, 900), ("line", (0, 9), 120, 1000), ("circle", 8, -1, 70, 800)],
+    "unseen": [("line", (-8, 11), 110, 900), ("circle", 9, -1, 90, 900), ("line", (6, -2), 60, 700)],
+}
+
+
+def path(moves):
+    """X and Y in mm: each move from rest to rest."""
+    points = [np.zeros((50, 2))]
+    for kind, what, *rest in moves:
+        start = points[-1][-1]
+        if kind == "line":
+            way = np.array(what, float) - start
+            s = profile([(float(np.hypot(*way)), *rest)])[50:]
+            points.append(start + np.outer(s / np.hypot(*way), way))
+        else:
+            sense, speed, acc = rest
+            s = profile([(math.tau * what, speed, acc)])[50:]
+            angle = sense * s / what
+            points.append(start + what * np.column_stack((1 - np.cos(angle), np.sin(angle))))
+    return np.round(np.concatenate(points), 6)
 
 
 def main():
@@ -120,16 +151,23 @@ def main():
     lines, gains = ["program,setpoint_mm,deviation_mm"], ["program,velocity,torque,delay_ms,rms_mm"]
     for name, moves in MOVES.items():
         x = profile(moves)
-        before = deviation(x, *BEFORE)
+        before = deviation(x, *BEFORE, CONTROL["X"], PLANT["X"])
         lines += [f"{name},{a:.6f},{b:.6f}" for a, b in zip(x, before)]
         rms = {}
         for v in VELOCITY:
             for t in TORQUE:
                 for d in DELAY_MS:
-                    rms[v, t, d] = math.sqrt(np.mean(deviation(x, v, t, d * 1e-3) ** 2))
+                    rms[v, t, d] = math.sqrt(np.mean(deviation(x, v, t, d * 1e-3, CONTROL["X"], PLANT["X"]) ** 2))
                     gains.append(f"{name},{v},{t},{d},{rms[v, t, d]:.9f}")
         best = min(rms, key=rms.get)
         print(name, len(x), "ms, before", math.sqrt(np.mean(before ** 2)), "best of the grid", best, rms[best])
+    rows = ["program,x_mm,x_deviation_mm,y_mm,y_deviation_mm"]
+    for name, moves in PATHS.items():
+        xy = path(moves)
+        both = [deviation(xy[:, i].copy(), *BEFORE, CONTROL[axis], PLANT[axis]) for i, axis in enumerate("XY")]
+        rows += [f"{name},{x:.6f},{a:.6f},{y:.6f},{b:.6f}" for (x, y), a, b in zip(xy, *both)]
+        print(name, len(xy), "ms, RMS of X and Y", [math.sqrt(np.mean(one ** 2)) for one in both])
+    (folder / "other_plant_xy.csv").write_text("\n".join(rows) + "\n")
     (folder / "other_plant.csv").write_text("\n".join(lines) + "\n")
     (folder / "other_plant_gains.csv").write_text("\n".join(gains) + "\n")
 

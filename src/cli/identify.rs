@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
   sollwert identify --plan -m my_machine.toml -o plan
   sollwert identify trace.xml --axis-name 1=X -m my_machine.toml -o identified.toml
   sollwert identify slow.mcap fast.mcap -m my_machine.toml --axis X --json
-  sollwert identify --smoothing trace.mcap part.mpf -m my_machine.toml -o calibrated.toml
+  sollwert identify --smoothing trace.mcap part.mpf -m my_machine.toml -o calibrated.toml --report page.html
 
 What a trace must hold, and how the values and their 95 % intervals are found, is in docs/identify.md. What the
 traces cannot tell is refused, with what to record instead. Torque constant, transmission and cycles are
@@ -58,9 +58,9 @@ pub(super) struct IdentifyArguments {
     /// Machine file to write, with the values, their intervals as comments, and everything else as it was; with --plan a folder
     #[arg(short, long, value_name = "MACHINE.toml")]
     pub(super) output: Option<PathBuf>,
-    /// Page to write: values with their intervals, refusals, friction over speed
-    #[arg(long, value_name = "PAGE.html", conflicts_with_all = ["plan", "smoothing"])]
-    report: Option<PathBuf>,
+    /// Page to write: values with their intervals, refusals, friction over speed; with --smoothing feed over the path
+    #[arg(long, value_name = "PAGE.html", conflicts_with = "plan")]
+    pub(super) report: Option<PathBuf>,
     /// One JSON document on stdout
     #[arg(long)]
     pub(super) json: bool,

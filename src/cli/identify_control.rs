@@ -5,6 +5,7 @@
 
 use super::failure::Failure;
 use super::identify::{IdentifyArguments, axes, read, write_whole};
+use super::identify_control_page::page;
 use super::inputs::refuse_same_file;
 use super::output::{ProgressLine, print, print_json, show, table};
 use crate::base::units::percent_from_ratio;
@@ -80,8 +81,8 @@ pub(super) fn calibration(arguments: &IdentifyArguments) -> Result<(), Failure> 
         ));
     }
     let inputs = arguments.traces.iter().chain(&arguments.validate).map(PathBuf::as_path);
-    if let Some(output) = &arguments.output {
-        refuse_same_file(inputs, output)?;
+    for output in arguments.output.iter().chain(&arguments.report) {
+        refuse_same_file(inputs.clone(), output)?;
     }
     let loaded = arguments.machine.load_to_run()?;
     let machine = &loaded.machine;
@@ -106,16 +107,25 @@ pub(super) fn calibration(arguments: &IdentifyArguments) -> Result<(), Failure> 
         write_whole(output, &calibrated.text_as_used)?;
     }
     let files: Vec<String> = pairs().map(|pair| pair[1].display().to_string()).collect();
+    if let Some(report) = &arguments.report {
+        write_whole(report, &page(&machine.name, &result, &files))?;
+    }
     if arguments.json {
         let mut document = control_document(&result, &files, &loaded);
         if let Some(output) = &arguments.output {
             document["output"] = json!(output.display().to_string());
         }
+        if let Some(report) = &arguments.report {
+            document["report"] = json!(report.display().to_string());
+        }
         print_json(&document)
     } else {
         print(&control_text(&result, &files))?;
-        match &arguments.output {
-            Some(output) => print(&format!("\nmachine file: {}\n", output.display())),
+        if let Some(output) = &arguments.output {
+            print(&format!("\nmachine file: {}\n", output.display()))?;
+        }
+        match &arguments.report {
+            Some(report) => print(&format!("page: {}\n", report.display())),
             None => Ok(()),
         }
     }
@@ -159,7 +169,7 @@ fn control_document(result: &ControlResult, files: &[String], loaded: &Loaded) -
     })
 }
 
-fn control_text(result: &ControlResult, files: &[String]) -> String {
+pub(super) fn control_text(result: &ControlResult, files: &[String]) -> String {
     let mut rows = vec![["setting", "value", "95 %: from", "to", ""].map(str::to_owned).to_vec()];
     rows.extend(result.estimates.iter().map(|e| {
         let number = |value: f64| format!("{value:.4}");

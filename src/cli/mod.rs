@@ -15,6 +15,7 @@ mod failure;
 mod follow;
 mod identify;
 mod identify_control;
+mod identify_control_page;
 mod identify_page;
 mod identify_tables;
 mod inputs;

@@ -47,7 +47,7 @@ pub(super) struct TuneArguments {
     /// Gains that may change
     #[arg(long, value_enum, value_delimiter = ',', default_value = "velocity,torque,delay")]
     gains: Vec<GainChoice>,
-    /// Bounds of a gain in the unit of its key, such as velocity=0.9..1.1; else 0.5..1.5, torque 0..2, delay 0..4 ms
+    /// Bounds of a gain in the unit of its key, such as velocity=0.9..1.1; else 0.5..1.5, torque 0..2, delay 0..4 ms or twice what is usual
     #[arg(long = "bound", value_name = "GAIN=LOW..HIGH")]
     bounds: Vec<String>,
     /// Axis to tune, such as X; all that move without it; may be given several times

@@ -4,7 +4,7 @@
 
 use super::output::table;
 use crate::base::units::UM_PER_MM;
-use crate::tune::{CourseFigures, Measure, Objective, Pair, TuneOptions, Tuned, TunedAxis};
+use crate::tune::{CourseFigures, Gain, Measure, Objective, Pair, TuneOptions, Tuned, TunedAxis, TunedGain};
 
 /// All of them.
 pub(super) fn tables(tuned: &Tuned, options: &TuneOptions) -> String {
@@ -21,11 +21,26 @@ pub(super) fn tables(tuned: &Tuned, options: &TuneOptions) -> String {
                 Measure::Rms => (found.rms, changed.rms),
                 Measure::Peak => (found.peak, changed.peak),
             };
-            let share = 100.0 * (changed / found.max(f64::MIN_POSITIVE) - 1.0);
-            vec![format!("{} {} {:+.0} %", one.axis, one.what, one.change_percent), format!("{share:+.1} %")]
+            let name = format!("{} {} {:+.0} %", one.axis, one.what, one.change_percent);
+            vec![name, share_percent(found, changed)]
         })
         .collect();
     text + &table(&rows)
+}
+
+/// An error for people.
+pub(super) fn shown(value: f64, unit: &str) -> String {
+    let unit = if unit == "mm" { "µm" } else { "mdeg" };
+    format!("{:.2} {unit}", value * UM_PER_MM)
+}
+
+/// How much a figure has changed.
+pub(super) fn share_percent(before: f64, after: f64) -> String {
+    // Less than a thousandth of the unit shown is none.
+    if before.max(after) < 1e-6 {
+        return "0.0 %".to_owned();
+    }
+    format!("{:+.1} %", 100.0 * (after / before.max(f64::MIN_POSITIVE) - 1.0))
 }
 
 /// What is small, in words.
@@ -45,25 +60,34 @@ fn gains(axes: &[TunedAxis]) -> String {
         for gain in &axis.gains {
             let unit = gain.gain.unit(axis.kind);
             let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-            let remark = match (gain.certain, gain.at_bound) {
-                (false, _) => "not told by the courses",
-                (true, true) => "at its bound",
-                (true, false) => "",
-            };
             rows.push(vec![
                 format!("{} {}", axis.name, gain.gain.key(axis.kind)),
                 format!("{:.4}{unit}", gain.before),
                 format!("{:.4}{unit}", gain.value),
                 format!("{:.4} .. {:.4}", gain.low, gain.high),
-                remark.to_owned(),
+                remark(gain, axis),
             ]);
         }
     }
     table(&rows)
 }
 
+/// What is to be known of a gain.
+pub(super) fn remark(gain: &TunedGain, axis: &TunedAxis) -> String {
+    let mut remarks = Vec::new();
+    if !gain.certain {
+        remarks.push("not told by the courses".to_owned());
+    } else if gain.at_bound {
+        remarks.push("at its bound".to_owned());
+    }
+    if gain.gain == Gain::Delay && axis.together.len() > 1 {
+        remarks.push(format!("one for {}", axis.together.join(", ")));
+    }
+    remarks.join("; ")
+}
+
 fn errors(courses: &[CourseFigures]) -> String {
-    let head = ["", "RMS", "", "floor", "peak", "", "floor"];
+    let head = ["", "RMS before", "after", "floor", "peak before", "after", "floor"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for course in courses {
         let kind = if course.validates { " (validation)" } else { "" };
@@ -79,13 +103,9 @@ fn errors(courses: &[CourseFigures]) -> String {
 }
 
 fn row(name: &str, pairs: &[Pair; 3], unit: &str) -> Vec<String> {
-    let shown = |value: f64| {
-        let unit = if unit == "mm" { "µm" } else { "mdeg" };
-        format!("{:.2} {unit}", value * UM_PER_MM)
-    };
     let mut cells = vec![name.to_owned()];
     for figure in [|pair: &Pair| pair.rms, |pair: &Pair| pair.peak] {
-        cells.extend(pairs.iter().map(|pair| shown(figure(pair))));
+        cells.extend(pairs.iter().map(|pair| shown(figure(pair), unit)));
     }
     cells
 }

@@ -181,7 +181,10 @@ fn mechanics(
     if source.is_folded() {
         unfold(&mut found, &of_best, machine, axis, data, source, result);
     }
-    result.others.extend(staged(&motions));
+    let turns = found.value(Parameter::GravitySin).is_some();
+    // The correction for sampling is that of least squares: the staged inertia would stand beside it without.
+    let comparable = |estimate: &Estimate| !(source.is_folded() && estimate.parameter == Parameter::Inertia);
+    result.others.extend(staged(&motions, turns).into_iter().filter(comparable));
     let mut push = |key, title: &str, value, unit| {
         result.figures.push(Figure { key, title: title.to_owned(), value, unit });
     };
@@ -247,6 +250,11 @@ fn unfold(
     let share = if data.identified { FOLDING_KNOWN_SHARE.0 } else { FOLDING_KNOWN_SHARE.1 };
     let mended = sampled.scaled(1.0 / folding.inertia_ratio);
     found.estimates[place] = mended.widened(share * off.abs() * mended.value.abs());
+    for estimate in &mut found.estimates {
+        if let Some((_, shift)) = folding.shifts.iter().find(|(parameter, _)| *parameter == estimate.parameter) {
+            *estimate = estimate.widened(*shift);
+        }
+    }
     result.verdicts.push(format!(
         "the current is one sample a position cycle, on its sawtooth: an axis with the controllers of the machine file reads {percent:+.1} % of \
          inertia from such samples, which is taken out, and the interval is wider for it"

@@ -8,15 +8,18 @@ use super::knobs::{Knob, Switch};
 use super::search::{Aim, Fit};
 use crate::base::AxisId;
 use crate::base::units::percent_from_ratio;
-use crate::machine::{CornerRule, Machine};
+use crate::machine::{CornerRule, Machine, TimeLawKind};
 
-/// Passes of a fit while words are compared, and of a fit.
-const PASSES: (usize, usize) = (3, 25);
+/// Steps of a fit while words are compared, and of a fit.
+const PASSES: (usize, usize) = (6, 40);
+/// Steps after which a time law is given up, if it leaves more than this many times the square of the best one.
+const FIRST_STEPS: usize = 3;
+const NEAR: f64 = 2.0;
 /// Rounds over all words.
 const ROUNDS: usize = 4;
 /// RMS of ln(feed) that is as good as none: where no word need be tried, and where a fit ends; and that from which other starts are tried.
 const LITTLE_LEFT: f64 = 4e-3;
-const NONE_LEFT: f64 = 5e-4;
+const NONE_LEFT: f64 = 1e-3;
 const MUCH_LEFT: f64 = 0.01;
 /// Another word must leave less than this share of the cost over.
 const BETTER_SHARE: f64 = 0.8;
@@ -69,7 +72,10 @@ impl<'a, 'b> Search<'a, 'b> {
             CornerRule::Overload => Knob::Overload,
         };
         let mut knobs = if per_axis { Knob::SHAPE.to_vec() } else { Vec::new() };
-        knobs.extend([Knob::RadialAcceleration, Knob::RadialJerk]);
+        // The law of the least time knows the true sums of the axes, no shares.
+        if machine.feed.time_law != TimeLawKind::Continuous {
+            knobs.extend([Knob::RadialAcceleration, Knob::RadialJerk]);
+        }
         if per_axis {
             knobs.extend(self.axes.iter().map(|id| Knob::TransitionJerk(Some(*id))));
             knobs.extend(self.axes.iter().map(|id| Knob::Jerk(Some(*id))));
@@ -82,7 +88,13 @@ impl<'a, 'b> Search<'a, 'b> {
 
     /// Knobs that the result rests on.
     pub(super) fn knobs(&self) -> Vec<Knob> {
-        self.knobs_of(&self.fit.machine, true)
+        let mut knobs = self.knobs_of(&self.fit.machine, true);
+        for share in [Knob::RadialAcceleration, Knob::RadialJerk] {
+            if !knobs.contains(&share) {
+                knobs.push(share);
+            }
+        }
+        knobs
     }
 
     /// The whole search.
@@ -108,7 +120,12 @@ impl<'a, 'b> Search<'a, 'b> {
             self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&machine)));
             let knobs = self.knobs_of(&machine, false);
             let mut trial = Fit { machine, plans: self.fit.plans, ..start.clone() };
-            let cost = trial.run(&knobs, Aim::Both, 2 * PASSES.0, NONE_LEFT * NONE_LEFT);
+            let enough = NONE_LEFT * NONE_LEFT;
+            let mut cost = trial.run(&knobs, Aim::Both, FIRST_STEPS, enough);
+            // One that does not come near in a few steps is the wrong one.
+            if cost.is_some_and(|cost| cost < NEAR * self.cost) {
+                cost = trial.run(&knobs, Aim::Both, PASSES.0, enough);
+            }
             self.fit.plans = trial.plans;
             if let Some(cost) = cost.filter(|cost| *cost < self.cost) {
                 (self.fit, self.cost) = (trial, cost);
@@ -220,7 +237,7 @@ impl<'a, 'b> Search<'a, 'b> {
                 (Knob::Jerk(None), plain),
             ]);
             let knobs = self.knobs_of(&self.fit.machine, false);
-            let cost = trial.run(&knobs, Aim::Both, 2 * PASSES.0, NONE_LEFT * NONE_LEFT);
+            let cost = trial.run(&knobs, Aim::Both, PASSES.0 + 4, NONE_LEFT * NONE_LEFT);
             self.fit.plans = trial.plans;
             if let Some(cost) = cost
                 && best.as_ref().is_none_or(|(least, _)| cost < *least)
@@ -308,12 +325,24 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
+    /// The machine whose other words are looked at: those of the corner rule begin where its steps are now.
+    fn machine_for(&self, switch: Switch) -> Machine {
+        let mut machine = self.fit.machine.clone();
+        if switch == Switch::CornerRule {
+            let step = [Knob::FollowUp, Knob::Overload]
+                .into_iter()
+                .filter(|knob| self.fit.values.iter().any(|v| v.0 == *knob));
+            step.for_each(|knob| knob.set(&mut machine, self.fit.value(knob)));
+        }
+        machine
+    }
+
     /// Which switches are told: the other words all drive differently.
     pub(super) fn told(&mut self) -> Vec<(Switch, bool)> {
         let limit = (DIFFERS * DIFFERS).max(self.cost);
         let mut told = Vec::new();
         for switch in Switch::TIME {
-            let differences = self.fit.differences(&switch.others(&self.fit.machine), Aim::Both);
+            let differences = self.fit.differences(&switch.others(&self.machine_for(switch)), Aim::Both);
             told.push((switch, differences.iter().all(|square| square.is_none_or(|square| square > limit))));
         }
         told

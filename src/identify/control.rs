@@ -7,10 +7,11 @@
 //! velocities and accelerations of the axes: those are machine data.
 
 use super::choose::{Search, Window};
+use super::contradict::{contradiction, nothing_fits};
 use super::knobs::{Knob, Switch};
 use super::profile::{PathProfile, linear_axes, shared_axes};
-use super::search::{Aim, Fit, Idle, Target};
-use crate::base::units::percent_from_ratio;
+use super::search::{Aim, Fit, Target, Told};
+use crate::base::units::{MM_PER_M, percent_from_ratio};
 use crate::base::{AxisId, Diagnostic};
 use crate::interpreter::Setup;
 use crate::machine::Machine;
@@ -34,7 +35,7 @@ pub struct ControlEstimate {
     pub title: &'static str,
     /// Best value.
     pub value: f64,
-    /// Lower end of the 95 % interval.
+    /// Lower end of what makes the same motion; the end of the range where raising or lowering it further changes nothing.
     pub low: f64,
     /// Upper end.
     pub high: f64,
@@ -53,6 +54,19 @@ pub struct Agreement {
     pub path_rms_mm: f64,
 }
 
+/// Feed over a path, at equal shares of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeedOverPath {
+    /// Length of the path.
+    pub length_mm: f64,
+    /// On the trace.
+    pub traced_mm_s: Vec<f64>,
+    /// Planned with the machine file as it was.
+    pub before_mm_s: Vec<f64>,
+    /// Planned as fitted.
+    pub after_mm_s: Vec<f64>,
+}
+
 /// What was found.
 #[derive(Clone, Debug)]
 pub struct ControlResult {
@@ -66,6 +80,8 @@ pub struct ControlResult {
     pub fitted: usize,
     /// With the machine file as it was, and as fitted: the programs of the fit first, then those not used.
     pub agreements: Vec<(Agreement, Agreement)>,
+    /// Feeds of the same programs, for a picture.
+    pub feeds: Vec<FeedOverPath>,
     /// `--set` arguments that make the fitted machine of the old one.
     pub sets: Vec<String>,
     /// Programs planned.
@@ -84,8 +100,6 @@ const LENGTH_SHARE: f64 = 0.03;
 const APART_SHARE: f64 = 0.01;
 /// An interval in free numbers (about a share of the value) beyond which a value is refused.
 const WIDE: f64 = 0.5;
-/// The grain of the differences.
-const GRAIN: f64 = 2e-3;
 
 /// Calibrates the control on traced programs, and looks at others.
 pub fn calibrate(
@@ -101,6 +115,7 @@ pub fn calibrate(
         choices: Vec::new(),
         fitted: fitted.len(),
         agreements: Vec::new(),
+        feeds: Vec::new(),
         sets: Vec::new(),
         plans: 0,
     };
@@ -114,18 +129,26 @@ pub fn calibrate(
     let mut fit = search.fit;
     take(&mut result, &mut fit, &knobs);
     let after = fit.machine_with(&fit.values);
-    sets(&mut result, &fit, machine, &after);
+    sets(&mut result, machine, &after);
     result.plans = fit.plans;
     let (old, new) = (Arc::new(machine.clone()), Arc::new(after));
     for pair in fitted.iter().chain(unseen) {
         let (target, axes) = target(pair, machine)?;
-        let one = |machine: &Arc<Machine>| {
-            let planned = PathProfile::planned(machine, &pair.setup, &axes);
-            planned.map(|planned| agreement(&planned, &target)).ok_or_else(|| refused(ALARM))
-        };
-        result.agreements.push((one(&old)?, one(&new)?));
+        let one =
+            |machine: &Arc<Machine>| PathProfile::planned(machine, &pair.setup, &axes).ok_or_else(|| refused(ALARM));
+        let (before, after) = (one(&old)?, one(&new)?);
+        result.agreements.push((agreement(&before, &target), agreement(&after, &target)));
+        result.feeds.push(FeedOverPath {
+            length_mm: target.length_mm,
+            traced_mm_s: target.coarse_feeds_mm_s(),
+            before_mm_s: before.coarse_feeds_mm_s(),
+            after_mm_s: after.coarse_feeds_mm_s(),
+        });
     }
-    Ok(result)
+    match nothing_fits(&result.agreements[..fitted.len()]) {
+        Some(finding) => Err(finding),
+        None => Ok(result),
+    }
 }
 
 const ALARM: &str = "a program ends in an alarm on this machine";
@@ -143,6 +166,9 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
                 "the path of the trace is {:.3} mm long, that of the program {:.3} mm",
                 profile.length_mm, before.length_mm
             )));
+        }
+        if let Some(finding) = contradiction(&profile, &before, &axes, machine) {
+            return Err(finding);
         }
         let apart_mm = before.sideways_rms_mm(&profile);
         if apart_mm > APART_SHARE * profile.length_mm {
@@ -215,48 +241,80 @@ fn words(result: &mut ControlResult, search: &mut Search<'_, '_>, told_shape: bo
 
 /// Estimates and refusals of numbers.
 fn take(result: &mut ControlResult, fit: &mut Fit<'_>, knobs: &[Knob]) {
-    let (solution, places) = fit.solution(knobs, Aim::Both);
-    for (knob, place) in knobs.iter().zip(places) {
+    let told = fit.told(knobs, Aim::Both);
+    let common = |knob: &Knob| match knob {
         // A factor on one axis comes on top of that on all of them.
-        let common = match knob {
-            Knob::TransitionJerk(Some(_)) => fit.value(Knob::TransitionJerk(None)),
-            Knob::Jerk(Some(_)) => fit.value(Knob::Jerk(None)),
-            _ => 1.0,
-        };
+        Knob::TransitionJerk(Some(_)) => fit.value(Knob::TransitionJerk(None)),
+        Knob::Jerk(Some(_)) => fit.value(Knob::Jerk(None)),
+        _ => 1.0,
+    };
+    for (place, knob) in knobs.iter().enumerate() {
         let value = fit.value(*knob);
+        let used = common(knob) * value;
         let key = knob.key(&fit.machine);
-        let (place, solution) = match (place, &solution) {
-            (Ok(place), Some(solution)) => (place, solution),
-            (Err(Idle::Alike), _) => {
-                let reason = format!("it is not told apart from the values above; {:.3} was used", common * value);
-                result.refusals.push((key, reason));
-                continue;
-            }
-            _ if knob.is_of_shape() => {
-                result.refusals.push((key, "no corner of this program shows it".to_owned()));
-                continue;
-            }
-            _ => {
-                result.refusals.push((key, "nothing in this program is held back by it".to_owned()));
-                continue;
-            }
-        };
-        // The step that is left, and the grain of the differences.
-        let half = solution.value(place).1 + solution.theta[place].abs() + GRAIN;
-        if half > WIDE {
-            let percent = percent_from_ratio(half);
-            let reason = format!("this program tells it to ±{percent:.0} % only; {:.3} was used", common * value);
-            result.refusals.push((key, reason));
-        } else {
-            let free = knob.free(value);
-            let [value, low, high] = [value, knob.value(free - half), knob.value(free + half)].map(|v| common * v);
-            result.estimates.push(ControlEstimate { key, title: knob.title(), value, low, high });
+        let halves = [0, 1].map(|side| told.as_ref().and_then(|told: &[Told; 2]| told[side].half(&[(place, 1.0)])));
+        if halves == [None, None] {
+            let nothing = "nothing in this program is held back by it";
+            let reason = if knob.is_of_shape() { "no corner of this program shows it" } else { nothing };
+            result.refusals.push((key, reason.to_owned()));
+            continue;
         }
+        if halves.iter().flatten().all(|half| *half > WIDE) {
+            let twin =
+                told.iter().flatten().find_map(|told| told.twin(place)).map(|twin| knobs[twin].key(&fit.machine));
+            let percent = percent_from_ratio(halves.iter().flatten().copied().fold(f64::INFINITY, f64::min));
+            let reason = match twin {
+                Some(twin) => {
+                    format!("it acts here as `{twin}` does, and cannot be separated from it; {used:.3} was used")
+                }
+                None => format!("this program tells it to ±{percent:.0} % only; {used:.3} was used"),
+            };
+            result.refusals.push((key, reason));
+            continue;
+        }
+        // Open where it is told from the other side only.
+        let free = knob.free(value);
+        let end = |half: Option<f64>, side: f64| {
+            let half = half.filter(|half| *half <= WIDE).unwrap_or(f64::INFINITY);
+            common(knob) * knob.value(free + side * half)
+        };
+        let (low, high) = (end(halves[0], -1.0), end(halves[1], 1.0));
+        result.estimates.push(ControlEstimate { key, title: knob.title(), value: used, low, high });
+    }
+    if let Some(told) = &told {
+        products(result, fit, knobs, told);
+    }
+}
+
+/// Share of the jerk across the path times transition jerk, where that is told better than the two of them: the blend law of published controls knows
+/// only the product.
+fn products(result: &mut ControlResult, fit: &Fit<'_>, knobs: &[Knob], told: &[Told; 2]) {
+    let Some(share_place) = knobs.iter().position(|knob| *knob == Knob::RadialJerk) else { return };
+    let share = fit.value(Knob::RadialJerk);
+    let machine = fit.machine_with(&fit.values);
+    for (place, knob) in knobs.iter().enumerate() {
+        let Knob::TransitionJerk(Some(id)) = knob else { continue };
+        // The share moves as its logit.
+        let halves = [&[(share_place, 1.0 - share), (place, 1.0)][..], &[(share_place, 1.0 - share)], &[(place, 1.0)]];
+        let half = |sum: &[(usize, f64)]| told.iter().filter_map(|side| side.half(sum)).fold(0.0, f64::max);
+        let [product, of_share, of_jerk] = halves.map(half);
+        if product <= 0.0 || product > WIDE || product > 0.5 * of_share.max(of_jerk) {
+            continue;
+        }
+        let axis = machine.axis(*id);
+        let value = share * axis.limits.transition_jerk_max_lu_s3 / MM_PER_M;
+        result.estimates.push(ControlEstimate {
+            key: format!("smoothing.radial_jerk_share * axes.{}.transition_jerk_max_m_s3", axis.name),
+            title: "jerk across the path, m/s³: the product is told better than its factors",
+            value,
+            low: value * (-product).exp(),
+            high: value * product.exp(),
+        });
     }
 }
 
 /// The changes as `--set` arguments.
-fn sets(result: &mut ControlResult, fit: &Fit<'_>, before: &Machine, after: &Machine) {
+fn sets(result: &mut ControlResult, before: &Machine, after: &Machine) {
     for switch in [Switch::Shape].into_iter().chain(Switch::TIME) {
         if switch.word(after) != switch.word(before) {
             result.sets.push(format!("{}={}", switch.key(), switch.word(after)));
@@ -265,8 +323,11 @@ fn sets(result: &mut ControlResult, fit: &Fit<'_>, before: &Machine, after: &Mac
     if after.look_ahead_blocks != before.look_ahead_blocks {
         result.sets.push(format!("look_ahead.blocks={}", after.look_ahead_blocks));
     }
-    let moved = fit.values.iter().filter(|(knob, value)| *value != knob.get(before));
-    result.sets.extend(moved.flat_map(|(knob, _)| knob.sets(before, after)));
+    let numbers =
+        [Knob::Alpha, Knob::Ratio, Knob::RatioReversal, Knob::RadialAcceleration, Knob::RadialJerk, Knob::Overload];
+    let moved = numbers.into_iter().filter(|knob| knob.get(after) != knob.get(before));
+    let of_axes = [Knob::TransitionJerk(None), Knob::Jerk(None), Knob::FollowUp];
+    result.sets.extend(moved.chain(of_axes).flat_map(|knob| knob.sets(before, after)));
     result.sets.sort();
     result.sets.dedup();
 }

@@ -392,9 +392,10 @@ fn push_gain(solution: Option<&Solution>, found: &mut Vec<Estimate>, result: &mu
 fn lags(records: &[AxisRecord], axis: &Axis, result: &mut AxisResult) {
     if have(records, |record| &record.filtered_velocity_lu_s) {
         let response = |record: &AxisRecord, k: usize| at(&record.filtered_velocity_lu_s, k);
-        if let Some((gain, taps_s, share)) = taps(records, response) {
-            // A difference of two set-points is half a cycle late itself.
-            let delay_s = taps_s + records[0].period_s / 2.0;
+        // A difference of two set-points is half a cycle late itself; what is no later than that is no filter.
+        let late = |(gain, taps_s, share): (f64, f64, f64)| (gain, taps_s + records[0].period_s / 2.0, share);
+        let filter = taps(records, response).map(late).filter(|filter| filter.1 > FILTER_MIN_S);
+        if let Some((gain, delay_s, share)) = filter {
             result.figures.push(Figure {
                 key: "setpoint_filter_delay_ms",
                 title: "delay of the set-point speed at the controller's input behind the set-point (a filter)"
@@ -431,6 +432,9 @@ fn lags(records: &[AxisRecord], axis: &Axis, result: &mut AxisResult) {
         result.figures.push(Figure { key: "position_lag_ms", title: title.to_owned(), value, unit: "ms" });
     }
 }
+
+/// A shorter delay is none.
+const FILTER_MIN_S: f64 = 5e-5;
 
 /// A filter of the set-point speed as taps: gain, mean delay, share left over.
 fn taps(records: &[AxisRecord], response: impl Fn(&AxisRecord, usize) -> f64) -> Option<(f64, f64, f64)> {

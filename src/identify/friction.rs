@@ -31,7 +31,8 @@ const SPRING: usize = 7;
 const STRIBECK: [usize; 3] = [8, 9, 10];
 const SQUARE: usize = 11;
 const ONE_SIDED: usize = 12;
-const WIDTH: usize = 13;
+const PLACE: usize = 13;
+const WIDTH: usize = 14;
 
 /// Terms that the law does not have, and what one that is there means.
 const ALTERNATIVES: [(usize, &str); 6] = [
@@ -52,8 +53,8 @@ const HALF_95: f64 = 1.96;
 /// How much of the shift by an alternative an interval takes in: the true law is neither of the two, and how far they lie apart counts as one standard
 /// error of what the law leaves out.
 const SHIFT_TAKEN: f64 = HALF_95;
-/// What differences at the position cycle do to the values at most, found on traces without noise.
-const METHOD_SHARE: f64 = 3e-4;
+/// What differences at the position cycle do to the values at most, found on traces without noise: inertia and Coulomb friction, and the others.
+const METHOD_SHARE: (f64, f64) = (1.5e-4, 5e-4);
 /// Length of a block: many times the window and the memory of a speed loop.
 const BLOCK_S: (f64, f64) = (0.25, 2.0);
 /// Blocks aimed at.
@@ -162,6 +163,7 @@ fn row(motion: &Motion, k: usize, speed_max_rad_s: f64) -> [f64; WIDTH] {
         stribeck(STRIBECK_SHARES[2]),
         w * w.abs(),
         w.abs(),
+        motion.position_lu[k],
     ]
 }
 
@@ -186,7 +188,8 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult)
             continue;
         };
         let (value, noise) = solution.value(place);
-        let half = noise.hypot(METHOD_SHARE * value).hypot(SHIFT_TAKEN * shifts[place]);
+        let method = if matches!(*column, J | TC) { METHOD_SHARE.0 } else { METHOD_SHARE.1 };
+        let half = noise.hypot(method * value).hypot(SHIFT_TAKEN * shifts[place]);
         let estimate = Estimate::around(parameter, value, half, Means::OneShot);
         match verdict(&estimate, &all, solution.stretches[place], found.value(Parameter::Coulomb)) {
             None => found.estimates.push(estimate),
@@ -245,8 +248,11 @@ fn columns(all: &Covered, axis: &Axis, result: &mut AxisResult) -> Option<(Vec<u
         if all.range_lu >= rad_from_deg(TURN_DEG) {
             columns.extend([GS, GC]);
         } else {
-            for parameter in [Parameter::GravitySin, Parameter::GravityCos] {
-                let reason = format!("the axis turns by less than {TURN_DEG:.0} deg");
+            // Over a small angle gravity is a straight line; it must not count as inertia or friction.
+            columns.push(PLACE);
+            for parameter in [Parameter::Gravity, Parameter::GravitySin, Parameter::GravityCos] {
+                let reason =
+                    format!("the axis turns by less than {TURN_DEG:.0} deg: constant, sine and cosine are one torque");
                 result.refuse(parameter, reason, "record a motion over a quarter of a turn or more");
             }
         }
@@ -343,7 +349,7 @@ fn verdict(estimate: &Estimate, all: &Covered, stretches: f64, coulomb: Option<f
             ),
             "record constant speeds from 5 to 90 % of the highest (`sollwert identify --plan`)".to_owned(),
         )),
-        Parameter::Coulomb if wide(0.3) && half > 0.02 * all.torque_max_n_m => Some((
+        Parameter::Coulomb if wide(0.15) && half > 0.02 * all.torque_max_n_m => Some((
             format!("it is not told from friction that grows with speed: ±{:.0} %", percent(half / value.abs())),
             "record constant speeds from 5 to 90 % of the highest, in both directions".to_owned(),
         )),

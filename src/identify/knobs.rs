@@ -259,16 +259,24 @@ fn others<T: Choice>(machine: &Machine, set: impl Fn(&mut Machine, T)) -> Vec<Ma
     T::WORDS.iter().map(with).collect()
 }
 
-/// Another corner rule. An overload factor begins where its steps are, in the geometric mean of the linear axes, those of the other rule: the file's
-/// factor was not in use.
+/// Another corner rule, with steps that are those of the present one in the geometric mean of the linear axes: what the file has for a rule that was not in
+/// use means nothing.
 fn with_corner_rule(machine: &mut Machine, rule: CornerRule) {
-    if rule == CornerRule::Overload && machine.feed.corner_rule != rule {
-        let period_s = machine.cycle.time_base.setpoint_period_s();
-        let ratio =
-            |axis: &Axis| (8.0 * axis.follow_up_tolerance_lu / axis.limits.acceleration_max_lu_s2).sqrt() / period_s;
-        let linear: Vec<f64> =
-            machine.axes.iter().filter(|axis| axis.kind == AxisKind::Linear).map(|axis| ratio(axis).ln()).collect();
-        machine.feed.overload_ratio = (linear.iter().sum::<f64>() / linear.len().max(1) as f64).exp();
+    if machine.feed.corner_rule == rule {
+        return;
+    }
+    let period_s = machine.cycle.time_base.setpoint_period_s();
+    let ratio =
+        |axis: &Axis| (8.0 * axis.follow_up_tolerance_lu / axis.limits.acceleration_max_lu_s2).sqrt() / period_s;
+    let linear: Vec<f64> =
+        machine.axes.iter().filter(|axis| axis.kind == AxisKind::Linear).map(|axis| ratio(axis).ln()).collect();
+    let mean = (linear.iter().sum::<f64>() / linear.len().max(1) as f64).exp();
+    match rule {
+        CornerRule::Overload => machine.feed.overload_ratio = mean,
+        CornerRule::FollowUp => {
+            let factor = (machine.feed.overload_ratio / mean).powi(2);
+            machine.axes.iter_mut().for_each(|axis| axis.follow_up_tolerance_lu *= factor);
+        }
     }
     machine.feed.corner_rule = rule;
 }

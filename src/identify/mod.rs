@@ -6,12 +6,13 @@
 //! `normal` solves least squares in blocks (intervals from leaving blocks out), `friction` and `staged` fit the mechanics, `aliasing`
 //! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` and
 //! `plan_control` write the programs to record. `profile`, `knobs`,
-//! `search`, `choose` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
+//! `search`, `choose`, `contradict` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
 //! Does not tune anything, and takes nothing from a machine file that it says it has identified.
 
 mod aliasing;
 mod axis;
 mod choose;
+mod contradict;
 mod control;
 mod feedforward;
 mod friction;
@@ -30,7 +31,8 @@ mod wire;
 mod write;
 
 pub use axis::{IdentifyOptions, identify};
-pub use control::{Agreement, ControlEstimate, ControlResult, TracedProgram, calibrate};
+pub use control::{Agreement, ControlEstimate, ControlResult, FeedOverPath, TracedProgram, calibrate};
+pub(crate) use normal::student_t;
 pub use plan::{PLANNED_SIGNALS, PlannedProgram, PlannedSignal, plan};
 pub use wire::{AxisResult, Estimate, Figure, Means, Parameter, Refusal, TorqueSource};
 pub use write::machine_text;

@@ -183,7 +183,7 @@ impl Solution {
 }
 
 /// 0.975 quantile of Student's t [Abramowitz 1964, eq. 26.7.5]; for less than two degrees of freedom that of two, times their ratio.
-fn student_t(freedom: f64) -> f64 {
+pub(crate) fn student_t(freedom: f64) -> f64 {
     let (z, v) = (1.959_963_985_f64, freedom.max(2.0));
     let terms = [
         (z.powi(3) + z) / 4.0,

@@ -15,6 +15,10 @@ use std::sync::Arc;
 
 /// Stretches of a path.
 pub(super) const CELLS: usize = 3000;
+/// Stretches that a speed is the mean of: in one alone the grain of the set-points is seen.
+const FEW: usize = 5;
+/// Stretches of it in a picture.
+const DRAWN: usize = 750;
 /// Set-points at most: five hours at 1 ms.
 const SETPOINTS_MAX: usize = 20_000_000;
 /// A step below this is standstill.
@@ -187,6 +191,20 @@ impl PathProfile {
         Some(Self { places_mm: borders, feeds_mm_s, length_mm, time_s, programmed_mm_s })
     }
 
+    /// Highest speed of each axis, as means of [`FEW`] stretches; nothing without a path.
+    pub(super) fn speeds_mm_s(&self) -> Vec<f64> {
+        let columns = self.places_mm.first().map_or(0, Vec::len);
+        let cell_mm = self.length_mm / CELLS as f64;
+        let mut speeds = vec![0.0_f64; columns];
+        for (places, feeds) in self.places_mm.windows(FEW + 1).zip(self.feeds_mm_s.windows(FEW)) {
+            let time_s: f64 = feeds.iter().map(|feed| cell_mm / feed).sum();
+            for (column, speed) in speeds.iter_mut().enumerate() {
+                *speed = speed.max((places[FEW][column] - places[0][column]).abs() / time_s);
+            }
+        }
+        speeds
+    }
+
     /// Sideways distances from `reference` at equal shares of the path, one vector a border.
     pub(super) fn sideways_mm(&self, reference: &Self) -> Vec<f64> {
         if self.places_mm.is_empty() || reference.places_mm.is_empty() {
@@ -205,6 +223,13 @@ impl PathProfile {
             all.extend(off.iter().zip(&tangent).map(|(d, t)| d - along * t / size));
         }
         all
+    }
+
+    /// Mean feeds of [`DRAWN`] stretches, for a picture.
+    pub(super) fn coarse_feeds_mm_s(&self) -> Vec<f64> {
+        // Equal ways: the mean feed is the harmonic one.
+        let mean = |feeds: &[f64]| feeds.len() as f64 / feeds.iter().map(|feed| 1.0 / feed.max(1e-9)).sum::<f64>();
+        self.feeds_mm_s.chunks(CELLS / DRAWN).map(mean).collect()
     }
 
     /// RMS of the differences of feed over the path.

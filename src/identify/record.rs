@@ -43,6 +43,33 @@ pub(super) struct AxisRecord {
     pub(super) fine: Option<FineRecord>,
 }
 
+impl AxisRecord {
+    /// Set-point, position and torque from a row on: what a simulation is held against.
+    pub(super) fn simulated_from(&self, row: usize) -> Self {
+        let cut = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[row.min(values.len())..].to_vec());
+        let torque = |torque: &Torque| {
+            let from = row.min(torque.values_n_m.len());
+            Torque { values_n_m: torque.values_n_m[from..].to_vec(), source: torque.source }
+        };
+        Self {
+            period_s: self.period_s,
+            count: self.count.saturating_sub(row),
+            setpoint_lu: cut(&self.setpoint_lu),
+            position_lu: cut(&self.position_lu),
+            position_from: self.position_from,
+            reference_lu: None,
+            deviation_lu: None,
+            following_lu: None,
+            velocity_feedforward_lu_s: None,
+            velocity_command_lu_s: None,
+            filtered_velocity_lu_s: None,
+            torque_feedforward_n_m: None,
+            torque: self.torque.as_ref().map(torque),
+            fine: None,
+        }
+    }
+}
+
 /// Torque of the motor, row by row.
 #[derive(Clone, Debug)]
 pub(super) struct Torque {

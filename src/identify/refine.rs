@@ -37,8 +37,9 @@ const GRAIN_SHARE: f64 = 5e-3;
 const GAIN_SHARE: f64 = 0.2;
 /// A block.
 const BLOCK_S: f64 = 0.25;
-/// Rest in front of a motion that a simulation can start from.
+/// Rest in front of a motion that a simulation can start from: at the start of a trace, and behind another motion, which must have settled.
 const REST_S: f64 = 0.01;
+const SETTLED_S: f64 = 0.2;
 
 /// What is fitted.
 struct Problem<'a> {
@@ -64,12 +65,15 @@ pub(super) fn refine(
     start: &Mechanics,
     result: &mut AxisResult,
 ) -> Option<Vec<Estimate>> {
-    if let Some(reason) = unfit(records, machine, known, start) {
+    let at_rest: Option<Vec<AxisRecord>> =
+        records.iter().map(|record| Some(record.simulated_from(rest_row(record)?))).collect();
+    if let Some(reason) = unfit(records, at_rest.as_deref(), machine, known, start) {
         if !start.estimates.is_empty() {
             result.verdicts.push(format!("no output-error refinement: {reason}"));
         }
         return None;
     }
+    let records = at_rest.as_deref()?;
     let free = free_parameters(result, start);
     let mut data = known.clone();
     set(&mut data, &start.estimates.iter().map(|e| (e.parameter, e.value)).collect::<Vec<_>>());
@@ -96,7 +100,13 @@ pub(super) fn refine(
 }
 
 /// Why no simulation can be held against these traces.
-fn unfit(records: &[AxisRecord], machine: &Machine, data: &DriveData, start: &Mechanics) -> Option<&'static str> {
+fn unfit(
+    records: &[AxisRecord],
+    at_rest: Option<&[AxisRecord]>,
+    machine: &Machine,
+    data: &DriveData,
+    start: &Mechanics,
+) -> Option<&'static str> {
     let cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
     if start.value(Parameter::Inertia).is_none() || start.value(Parameter::Coulomb).is_none() {
         return Some("inertia or Coulomb friction is missing to start from");
@@ -118,16 +128,33 @@ fn unfit(records: &[AxisRecord], machine: &Machine, data: &DriveData, start: &Me
     if records.iter().map(|record| record.count).sum::<usize>() > ROWS_MAX {
         return Some("the traces are longer than a minute at 1 ms");
     }
-    let rests = |record: &AxisRecord| {
-        let rows = ((REST_S / record.period_s) as usize).max(2);
-        let setpoint = record.setpoint_lu.as_deref().unwrap_or(&[]);
-        let complete = setpoint.iter().all(|value| value.is_finite());
-        complete && setpoint.iter().take(rows).all(|value| (value - setpoint[0]).abs() < 1e-9)
-    };
-    if !records.iter().all(rests) {
-        return Some("a trace does not begin at rest, or has gaps: the simulation would start in another state");
+    if at_rest.is_none() {
+        return Some("a trace has no rest of 0.2 s to start a simulation from, or has gaps behind it");
     }
     None
+}
+
+/// The row from which a simulation can begin: the first one where the trace begins at rest, else one in the first rest that is long enough for the
+/// axis to have settled. `None` where there is none, or a gap behind it.
+fn rest_row(record: &AxisRecord) -> Option<usize> {
+    let setpoint = record.setpoint_lu.as_deref()?;
+    let rows = |seconds: f64| ((seconds / record.period_s) as usize).max(2);
+    let still = |from: usize, rows: usize| {
+        setpoint.get(from..from + rows).is_some_and(|rest| rest.iter().all(|value| (value - rest[0]).abs() < 1e-9))
+    };
+    let from = if still(0, rows(REST_S)) {
+        0
+    } else {
+        let (settled, mut since) = (rows(SETTLED_S), 0);
+        let end = (1..setpoint.len()).find(|k| {
+            if (setpoint[*k] - setpoint[*k - 1]).abs() >= 1e-9 || !setpoint[*k].is_finite() {
+                since = *k;
+            }
+            *k - since >= settled
+        })?;
+        end - rows(REST_S)
+    };
+    setpoint[from..].iter().all(|value| value.is_finite()).then_some(from)
 }
 
 fn free_parameters(result: &AxisResult, start: &Mechanics) -> Vec<Parameter> {

@@ -6,7 +6,6 @@
 //! stays there. Columns of differences are planned side by side. Does not choose words.
 
 use super::knobs::Knob;
-use super::normal::{Blocks, Solution};
 use super::profile::{CELLS, PathProfile};
 use crate::base::AxisId;
 use crate::interpreter::Setup;
@@ -33,6 +32,8 @@ pub(super) enum Aim {
 
 /// Step of a free number for the differences: wide enough to see through the grain of the set-point cycle.
 const STEP: f64 = 0.02;
+/// The same for what is told: wide enough to see where a limit ceases to hold.
+const SIDE_STEP: f64 = 0.1;
 /// Longest step of a free number in one pass: the law is bent.
 const STEP_MAX: f64 = 0.8;
 /// Sideways distances are counted in this: alone, and beside ln(feed): 1 um there is as much as 1 % of feed.
@@ -40,19 +41,22 @@ const SIDEWAYS_MM: (f64, f64) = (1e-3, 0.1);
 /// Pull to where a knob began, in RMS of ln(feed) for a free number that is off by 1.
 const PULL: f64 = 2e-4;
 /// Share of the mean feed below which feeds count as alike: the ends of a motion are no matter of ratios.
-const FLOOR_SHARE: f64 = 0.05;
+const FLOOR_SHARE: f64 = 0.2;
 /// Damping: at the start, least, most, and what a failure and a success make of it.
 const DAMPING: (f64, f64, f64) = (1e-3, 1e-7, 1e3);
-const WORSE: f64 = 6.0;
-const BETTER: f64 = 0.2;
-/// A pass that gains less than this share of the cost was the last.
-const GAIN_SHARE: f64 = 1e-3;
-/// Stretches of a block.
-const BLOCK: usize = 60;
+const WORSE: f64 = 10.0;
+const BETTER: f64 = 0.1;
+/// A pass that gains less than this share of the cost was the last; one with carried columns asks for new ones below the other share.
+const GAIN_SHARE: f64 = 1e-2;
+const SLOW_SHARE: f64 = 0.1;
+/// Pairs of dampings that are tried at most.
+const TRIES: usize = 4;
 /// What a free number moved by 1 does at least, in RMS, for the knob to count.
 const DOES_SOMETHING: f64 = 2e-3;
-/// Condition from which two settings count as one.
-const ALIKE: f64 = 40.0;
+/// RMS of ln(feed) that two plans of one control may differ by: a few set-point cycles in the time of a short stretch.
+const GRAIN: f64 = 1e-3;
+/// Correlation from which two settings count as one.
+const ALIKE: f64 = 0.9;
 
 /// A fit in progress.
 #[derive(Clone)]
@@ -137,14 +141,34 @@ impl Fit<'_> {
 
     /// Columns d residuals / d free number.
     fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim) -> Vec<Option<Vec<f64>>> {
+        let step = |knob: &Knob| {
+            let now = knob.free(self.value(*knob));
+            // Towards the middle of the range where there is an end of it.
+            if knob.value(now + STEP) > knob.value(now) * (1.0 + STEP / 1e3) { STEP } else { -STEP }
+        };
+        let steps: Vec<f64> = knobs.iter().map(step).collect();
+        let of = |knob: &Knob| knobs.iter().position(|known| known == knob).map_or(STEP, |place| steps[place]);
+        self.slopes(base, knobs, aim, of)
+    }
+
+    /// The same with given steps; `None` for a knob that stands at an end of its range, and after an alarm.
+    fn slopes(
+        &mut self,
+        base: &[f64],
+        knobs: &[Knob],
+        aim: Aim,
+        step: impl Fn(&Knob) -> f64 + Sync,
+    ) -> Vec<Option<Vec<f64>>> {
         self.plans += knobs.len() * self.targets.len();
         let column = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
-            // Towards the middle of the range where there is an end of it.
-            let step = if knob.value(now + STEP) > knob.value(now) * (1.0 + STEP / 1e3) { STEP } else { -STEP };
-            let values = self.with(&[(*knob, knob.value(now + step))]);
-            let moved = self.residuals(&values, aim)?;
-            Some(base.iter().zip(&moved).map(|(a, b)| (b - a) / step).collect())
+            let moved = knob.value(now + step(knob));
+            let by = knob.free(moved) - now;
+            if by.abs() < 0.5 * STEP {
+                return None;
+            }
+            let residuals = self.residuals(&self.with(&[(*knob, moved)]), aim)?;
+            Some(base.iter().zip(&residuals).map(|(a, b)| (b - a) / by).collect())
         };
         knobs.par_iter().map(column).collect()
     }
@@ -155,7 +179,8 @@ impl Fit<'_> {
         self.residuals(&self.values, aim).map(|residuals| square(&residuals))
     }
 
-    /// Turns `knobs` until the cost is least, or below `enough`. Returns it, without the pull.
+    /// Turns `knobs` until the cost is least, or below `enough`. Returns it, without the pull. Columns are planned where they must be, and between two
+    /// such passes carried on by what each step shows (Broyden): a step costs a plan or two instead of one a knob.
     pub(super) fn run(&mut self, knobs: &[Knob], aim: Aim, passes: usize, enough: f64) -> Option<f64> {
         self.plans += self.targets.len();
         let origin: Vec<f64> = knobs.iter().map(|knob| knob.free(knob.get(&self.machine))).collect();
@@ -163,80 +188,167 @@ impl Fit<'_> {
         let mut free: Vec<f64> = knobs.iter().map(|knob| knob.free(self.value(*knob))).collect();
         let mut base = self.residuals(&self.values, aim)?;
         let mut damping = DAMPING.0;
+        let mut columns: Option<Vec<Option<Vec<f64>>>> = None;
+        let mut fresh = false;
         for _ in 0..passes {
             let before = square(&base) + pull(&free);
             if square(&base) < enough {
                 break;
             }
-            let columns = self.columns(&base, knobs, aim);
-            let (gram, gradient) = normal(&columns, &base, &free, &origin);
-            let mut better = None;
-            while better.is_none() && damping < DAMPING.2 {
-                let damped = &gram + DMatrix::from_diagonal(&gram.diagonal().map(|d| damping * (d + PULL * PULL)));
-                let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else { break };
-                let trial: Vec<f64> = (free.iter().zip(&step).zip(knobs))
-                    .map(|((f, s), knob)| knob.free(knob.value(f - s.clamp(-STEP_MAX, STEP_MAX))))
-                    .collect();
-                let values = self.with(&knobs.iter().zip(&trial).map(|(k, f)| (*k, k.value(*f))).collect::<Vec<_>>());
-                self.plans += self.targets.len();
-                better = self
-                    .residuals(&values, aim)
-                    .filter(|r| square(r) + pull(&trial) < before)
-                    .map(|residuals| (values, residuals, trial));
-                damping = if better.is_some() { (damping * BETTER).max(DAMPING.1) } else { damping * WORSE };
-            }
-            let Some((values, residuals, trial)) = better else { break };
+            let slopes = match columns.take() {
+                Some(carried) => carried,
+                None => {
+                    fresh = true;
+                    self.columns(&base, knobs, aim)
+                }
+            };
+            let step = self.step(
+                knobs,
+                aim,
+                &slopes,
+                Place { base: &base, free: &free, origin: &origin, before },
+                damping,
+                fresh,
+            );
+            let Some((values, residuals, trial, eased)) = step else {
+                if fresh {
+                    break;
+                }
+                damping = DAMPING.0;
+                continue;
+            };
+            damping = eased;
+            let gained = before - square(&residuals) - pull(&trial);
+            let moved: Vec<f64> = trial.iter().zip(&free).map(|(new, old)| new - old).collect();
+            columns = Some(carried(slopes, &base, &residuals, &moved));
             (self.values, base, free) = (values, residuals, trial);
-            if before - square(&base) - pull(&free) < GAIN_SHARE * before {
-                break;
+            if gained < if fresh { GAIN_SHARE } else { SLOW_SHARE } * before {
+                if fresh {
+                    break;
+                }
+                columns = None;
             }
+            fresh = false;
         }
         Some(square(&base))
     }
 
-    /// Normal equations in blocks at the present values: for each knob its place in the solution, or why it is not in it.
-    pub(super) fn solution(&mut self, knobs: &[Knob], aim: Aim) -> (Option<Solution>, Vec<Result<usize, Idle>>) {
-        self.plans += self.targets.len();
-        let Some(base) = self.residuals(&self.values, aim) else {
-            return (None, knobs.iter().map(|_| Err(Idle::Still)).collect());
+    /// The better of two steps of unlike damping, with more of it until one helps: values, residuals, free numbers, and the damping from here on.
+    fn step(
+        &mut self,
+        knobs: &[Knob],
+        aim: Aim,
+        columns: &[Option<Vec<f64>>],
+        at: Place<'_>,
+        damping: f64,
+        fresh: bool,
+    ) -> Option<Step> {
+        let pull = |free: &[f64]| free.iter().zip(at.origin).map(|(f, o)| (PULL * (f - o)).powi(2)).sum::<f64>();
+        let (gram, gradient) = normal(columns, at.base, at.free, at.origin);
+        let trial = |damping: f64| {
+            let damped = &gram + DMatrix::from_diagonal(&gram.diagonal().map(|d| damping * (d + PULL * PULL)));
+            let step = damped.cholesky()?.solve(&gradient);
+            let free = (at.free.iter().zip(&step).zip(knobs))
+                .map(|((f, s), knob)| knob.free(knob.value(f - s.clamp(-STEP_MAX, STEP_MAX))))
+                .collect::<Vec<f64>>();
+            let values = self.with(&knobs.iter().zip(&free).map(|(k, f)| (*k, k.value(*f))).collect::<Vec<_>>());
+            let residuals = self.residuals(&values, aim)?;
+            Some((square(&residuals) + pull(&free), (values, residuals, free, damping)))
         };
-        let columns = self.columns(&base, knobs, aim);
-        let moving: Vec<usize> = (0..knobs.len())
-            .filter(|k| columns[*k].as_ref().is_some_and(|column| square(column).sqrt() > DOES_SOMETHING))
-            .collect();
-        let mut blocks = Blocks::new(moving.len());
-        let numbers = self.targets.iter().enumerate().flat_map(|(place, target)| {
-            let columns = if target.profile.places_mm.is_empty() { 0 } else { target.axes.len() };
-            let feeds = (0..=CELLS).map(move |row| (place, 0, row / BLOCK));
-            let path = (0..(CELLS + 1) * columns).map(move |row| (place, 1, row / (BLOCK * columns)));
-            let feeds = feeds.filter(move |_| aim == Aim::Both);
-            feeds.chain(path)
-        });
-        let mut open = None;
-        for ((k, r), number) in base.iter().enumerate().zip(numbers) {
-            if open.is_some_and(|open| open != number) {
-                blocks.close();
-            }
-            open = Some(number);
-            let row: Vec<f64> = moving.iter().filter_map(|place| columns[*place].as_ref()).map(|c| c[k]).collect();
-            blocks.push_in(number.2, &row, -r);
+        let (mut damping, mut tries, mut plans) = (damping, if fresh { TRIES } else { 1 }, 0);
+        let mut found = None;
+        while found.is_none() && tries > 0 && damping < DAMPING.2 {
+            plans += 2 * self.targets.len();
+            let both: Vec<Option<(f64, Step)>> = [damping, damping * WORSE].par_iter().map(|d| trial(*d)).collect();
+            let best = both.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
+            found = best.filter(|(cost, _)| *cost < at.before).map(|(_, step)| step);
+            damping *= WORSE * WORSE;
+            tries -= 1;
         }
-        let apart = told_apart(&blocks, moving.len());
-        let of = |knob: usize| {
-            let column = moving.iter().position(|place| *place == knob).ok_or(Idle::Still)?;
-            apart.iter().position(|place| *place == column).ok_or(Idle::Alike)
-        };
-        (blocks.solve(&apart), (0..knobs.len()).map(of).collect())
+        self.plans += plans;
+        found.map(|(values, residuals, free, used)| (values, residuals, free, (used * BETTER).max(DAMPING.1)))
+    }
+
+    /// What the motion tells about each knob at the present values, below them and above; `None` after an alarm.
+    pub(super) fn told(&mut self, knobs: &[Knob], aim: Aim) -> Option<[Told; 2]> {
+        self.plans += self.targets.len();
+        let base = self.residuals(&self.values, aim)?;
+        let left = square(&base).sqrt().hypot(GRAIN);
+        let mut sides = Vec::new();
+        for side in [-SIDE_STEP, SIDE_STEP] {
+            let columns = self.slopes(&base, knobs, aim, |_| side);
+            let does = |column: &Option<Vec<f64>>| column.as_ref().is_some_and(|c| square(c).sqrt() > DOES_SOMETHING);
+            let moving: Vec<usize> = (0..knobs.len()).filter(|k| does(&columns[*k])).collect();
+            let picked: Vec<Option<Vec<f64>>> = moving.iter().map(|k| columns[*k].clone()).collect();
+            let still = vec![0.0; moving.len()];
+            let factor = normal(&picked, &base, &still, &still).0.cholesky()?;
+            let place = |knob: usize| moving.iter().position(|k| *k == knob);
+            sides.push(Told { places: (0..knobs.len()).map(place).collect(), inverse: factor.inverse(), left });
+        }
+        sides.try_into().ok()
     }
 }
 
-/// Why a knob is not told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Idle {
-    /// It moves nothing.
-    Still,
-    /// It moves what others move.
-    Alike,
+/// What a motion tells about knobs on one side of their values: every set of free numbers whose motion differs from the best one by no more than what that
+/// leaves over is as good. What is left over is no noise, so that more of the same would not average it out. A limit that holds nothing back when it is
+/// raised is told from below only.
+pub(super) struct Told {
+    /// Place of each knob; `None` where it moves nothing.
+    places: Vec<Option<usize>>,
+    inverse: DMatrix<f64>,
+    left: f64,
+}
+
+impl Told {
+    /// Half of the width of a sum of free numbers with weights; `None` where one of them moves nothing.
+    pub(super) fn half(&self, sum: &[(usize, f64)]) -> Option<f64> {
+        let mut direction = DVector::zeros(self.inverse.nrows());
+        for (knob, weight) in sum {
+            direction[(*self.places.get(*knob)?)?] += weight;
+        }
+        Some(self.left * direction.dot(&(&self.inverse * &direction)).max(0.0).sqrt())
+    }
+
+    /// The knob that acts most alike, if hardly anything tells the two apart.
+    pub(super) fn twin(&self, knob: usize) -> Option<usize> {
+        let own = (*self.places.get(knob)?)?;
+        let alike = |other: usize| {
+            self.inverse[(own, other)].abs() / (self.inverse[(own, own)] * self.inverse[(other, other)]).sqrt()
+        };
+        let others = self.places.iter().enumerate().filter_map(|(k, place)| Some((k, (*place)?)));
+        let best = others.filter(|(k, _)| *k != knob).max_by(|a, b| alike(a.1).total_cmp(&alike(b.1)))?;
+        (alike(best.1) > ALIKE).then_some(best.0)
+    }
+}
+
+/// Where a step begins.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    base: &'a [f64],
+    free: &'a [f64],
+    origin: &'a [f64],
+    before: f64,
+}
+
+/// Values, residuals, free numbers, damping.
+type Step = (Vec<(Knob, f64)>, Vec<f64>, Vec<f64>, f64);
+
+/// The columns with what a step has shown: the smallest change that explains it (Broyden).
+fn carried(columns: Vec<Option<Vec<f64>>>, old: &[f64], new: &[f64], moved: &[f64]) -> Vec<Option<Vec<f64>>> {
+    let size = square(moved);
+    if size <= 0.0 {
+        return columns;
+    }
+    let mut missing: Vec<f64> = new.iter().zip(old).map(|(new, old)| new - old).collect();
+    for (column, moved) in columns.iter().zip(moved) {
+        let Some(column) = column else { continue };
+        missing.iter_mut().zip(column).for_each(|(missing, slope)| *missing -= slope * moved);
+    }
+    let add = |(column, moved): (Option<Vec<f64>>, &f64)| {
+        let share = moved / size;
+        column.map(|column| column.iter().zip(&missing).map(|(slope, missing)| slope + share * missing).collect())
+    };
+    columns.into_iter().zip(moved).map(add).collect()
 }
 
 fn square(values: &[f64]) -> f64 {
@@ -254,16 +366,4 @@ fn normal(columns: &[Option<Vec<f64>>], base: &[f64], free: &[f64], origin: &[f6
     });
     let gradient = DVector::from_fn(p, |i, _| dot(&columns[i], base) + PULL * PULL * (free[i] - origin[i]));
     (gram, gradient)
-}
-
-/// Columns that are told apart, the first ones first: shares and jerks may act as one product.
-fn told_apart(blocks: &Blocks, width: usize) -> Vec<usize> {
-    let mut kept: Vec<usize> = Vec::new();
-    for column in 0..width {
-        let trial: Vec<usize> = kept.iter().copied().chain([column]).collect();
-        if blocks.solve(&trial).is_some_and(|solution| solution.condition < ALIKE) {
-            kept = trial;
-        }
-    }
-    kept
 }

@@ -3,10 +3,11 @@
 //! In: [`Motion`]s of one axis. Out: estimates in SI units at the motor, to be held against those of least squares over everything.
 //!
 //! ```text
-//! mean τ of a run = Tc sgn w + B w + g0        runs of 0.1 s and more, 0.1 s after the speed is reached
-//! J = Σ (τ - Tc sgn w - B w - g0) w' / Σ w'²   where |w'| is large
+//! mean τ of a run = Tc sgn w + B w + Tg        runs of 0.1 s and more, 0.1 s after the speed is reached
+//! J = Σ (τ - Tc sgn w - B w - Tg) w' / Σ w'²   where |w'| is large
 //! ```
-//! [Prévost 2009]. Does not know gravity that turns with the axis, and gives nothing where there are fewer than four runs or one direction.
+//! Tg = g0, and of a rotary axis that turns far enough g0 + gs mean(sin x) + gc mean(cos x) [Prévost 2009]. Gives nothing where there are fewer
+//! runs than values and one more, or one direction.
 
 use super::motion::Motion;
 use super::normal::Blocks;
@@ -20,47 +21,47 @@ const RUN_S: f64 = 0.1;
 const CONSTANT_SHARE: f64 = 0.03;
 /// Share of it above which inertia counts.
 const ACCELERATING_SHARE: f64 = 0.2;
-/// Runs at least.
-const RUNS_MIN: usize = 4;
-
-/// Friction and inertia in stages; empty where the traces do not hold the runs.
-pub(super) fn staged(motions: &[Motion]) -> Vec<Estimate> {
+/// Friction and inertia in stages; empty where the traces do not hold the runs. `turns`: gravity turns with the axis.
+pub(super) fn staged(motions: &[Motion], turns: bool) -> Vec<Estimate> {
     let fastest = motions.iter().flat_map(|motion| &motion.acceleration_rad_s2).filter(|a| a.is_finite());
     let acceleration_max_rad_s2 = fastest.fold(0.0_f64, |most, a| most.max(a.abs()));
-    let mut runs = Blocks::new(3);
+    let parameters = &STAGES[..if turns { 5 } else { 3 }];
+    let mut runs = Blocks::new(parameters.len());
     let (mut count, mut forward) = (0_usize, 0_usize);
     for motion in motions {
         for (from, to) in constant_runs(motion, CONSTANT_SHARE * acceleration_max_rad_s2) {
-            let mean = |values: &[f64]| values[from..to].iter().sum::<f64>() / (to - from) as f64;
-            let (w, torque) = (mean(&motion.speed_rad_s), mean(&motion.torque_n_m));
             // A longer run counts for more.
             let weight = ((to - from) as f64 * motion.period_s).sqrt();
-            runs.push_in(count, &[w * weight, w.signum() * weight, weight], torque * weight);
+            let mut mean = [0.0; 6];
+            for k in from..to {
+                let row = row(motion, k);
+                let with_torque = row.iter().chain([&motion.torque_n_m[k]]);
+                mean.iter_mut().zip(with_torque).for_each(|(mean, value)| *mean += weight * value / (to - from) as f64);
+            }
+            runs.push_in(count, &mean[..parameters.len()], mean[5]);
             count += 1;
-            forward += usize::from(w > 0.0);
+            forward += usize::from(mean[0] > 0.0);
         }
     }
-    if count < RUNS_MIN || forward == 0 || forward == count {
+    if count <= parameters.len() || forward == 0 || forward == count {
         return Vec::new();
     }
-    let Some(friction) = runs.solve(&[0, 1, 2]) else { return Vec::new() };
-    let mut found: Vec<Estimate> = [Parameter::Viscous, Parameter::Coulomb, Parameter::Gravity]
-        .into_iter()
-        .enumerate()
-        .map(|(place, parameter)| {
-            let (value, half) = friction.value(place);
-            Estimate::around(parameter, value, half, Means::Staged)
-        })
-        .collect();
-    let [viscous, coulomb, gravity] = [0, 1, 2].map(|place| friction.theta[place]);
+    let columns: Vec<usize> = (0..parameters.len()).collect();
+    let Some(friction) = runs.solve(&columns) else { return Vec::new() };
+    let of = |(place, parameter): (usize, &Parameter)| {
+        let (value, half) = friction.value(place);
+        Estimate::around(*parameter, value, half, Means::Staged)
+    };
+    let mut found: Vec<Estimate> = parameters.iter().enumerate().map(of).collect();
     let mut pushes = Blocks::new(1);
     for motion in motions {
         let per_block = ((0.25 / motion.period_s).round() as usize).max(1);
         for k in (0..motion.moves.len()).filter(|k| motion.moves[*k]) {
-            let (w, a) = (motion.speed_rad_s[k], motion.acceleration_rad_s2[k]);
+            let a = motion.acceleration_rad_s2[k];
             if a.abs() > ACCELERATING_SHARE * acceleration_max_rad_s2 {
-                let left = motion.torque_n_m[k] - coulomb * w.signum() - viscous * w - gravity;
-                pushes.push_in(k / per_block, &[a], left);
+                let without: f64 =
+                    friction.theta.iter().zip(row(motion, k)).map(|(value, column)| value * column).sum();
+                pushes.push_in(k / per_block, &[a], motion.torque_n_m[k] - without);
             }
         }
         pushes.close();
@@ -70,6 +71,15 @@ pub(super) fn staged(motions: &[Motion]) -> Vec<Estimate> {
         found.insert(0, Estimate::around(Parameter::Inertia, value, half, Means::Staged));
     }
     found
+}
+
+/// What the runs tell, in the order of a row.
+const STAGES: [Parameter; 5] =
+    [Parameter::Viscous, Parameter::Coulomb, Parameter::Gravity, Parameter::GravitySin, Parameter::GravityCos];
+
+fn row(motion: &Motion, k: usize) -> [f64; 5] {
+    let (w, (sin, cos)) = (motion.speed_rad_s[k], motion.position_lu[k].sin_cos());
+    [w, w.signum(), 1.0, sin, cos]
 }
 
 /// Stretches of constant speed, the settling left out.

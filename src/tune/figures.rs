@@ -87,7 +87,9 @@ fn shown(pair: Pair, kind: AxisKind) -> Pair {
     }
 }
 
+/// And without the pulse against it, which would be an error of its own there.
 fn without_dry_friction(mut data: DriveData) -> DriveData {
+    data.options.friction_pulse_lu_s = 0.0;
     data.mechanics.coulomb_friction_n_m = 0.0;
     data.mechanics.breakaway_friction_n_m = 0.0;
     data

@@ -1,283 +1,166 @@
-//! Gauss-Newton in the gains, and how certain they are.
+//! Gauss-Newton in the gains, from several starts side by side, and a look at the whole range.
 //!
-//! In: a group and a start. Out: gains with the least mean square, 95 % intervals. The residuals are affine in the gains between stick events, so
-//! that one simulation with each gain moved gives all derivatives. A preference for theory (its width is [`PREFERENCE_STEPS`] steps of a search)
-//! weighs as much as the scatter of blocks of residuals leaves room for: where courses tell a gain it does nothing. Intervals: block
-//! bootstrap, because residuals are strongly correlated.
+//! In: a group, starts. Out: the [`Point`] with the least mean square, with the affine model around it. Residuals are affine in the gains between
+//! stick events: one simulation with each gain moved gives all derivatives, and the drive steps eight sets of gains together, so that two
+//! starts with their derivatives are one run. Points spread over the bounds are tried at the end: a better valley elsewhere is gone down.
 
-use super::gains::{Gain, Gains};
-use super::group::{BLOCK_S, Group, Residual, Score};
+use super::gains::Gains;
+use super::group::{Group, Residual, Score, score};
+use super::normal::{Normal, Step, difference_steps};
 
-/// Passes from each start.
-const PASSES: usize = 2;
-/// Shares of a step that are tried.
-const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
-/// Width of the preference for theory.
-const PREFERENCE_STEPS: f64 = 3.0;
-/// Resamplings.
-const RESAMPLES: usize = 400;
-/// Sweeps of the small bounded problem.
-const SWEEPS: usize = 400;
-/// An interval wider than this share of the preference tells nothing of its own.
-const TELLING_SHARE: f64 = 0.5;
+/// Runs of points with their derivatives.
+const PASSES: usize = 5;
+/// A step smaller than this share of a step of the search is none.
+const DONE_SHARE: f64 = 0.01;
+/// Ends nearer than this share of a step of the search are the same.
+const SAME_SHARE: f64 = 0.2;
+/// The smallest share of a step that is tried.
+const LEAST_SHARE: f64 = 0.2;
+/// Points over the bounds.
+const SCAN_POINTS: usize = 8;
+/// Points nearer to the end than this, in steps of the search, should say the same of it.
+const NEIGHBOUR_STEPS: f64 = 2.0;
+/// Bases of the radical inverse, one for each gain: the points fill the box evenly [Halton 1960].
+const PRIMES: [u32; 24] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
 
-/// 95 % interval of a slot, inside.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Certainty {
-    pub low: f64,
-    pub high: f64,
-    pub certain: bool,
+/// A set of gains, how good it is, and the affine model around it.
+#[derive(Clone)]
+pub(super) struct Point {
+    pub gains: Vec<Gains>,
+    pub score: Score,
+    pub normal: Normal,
+    /// Where the model around it has the least mean square, slot by slot.
+    pub predicted: Vec<f64>,
+    /// Mean square distance of what the models around it and its neighbours predict: 0 if residuals were affine.
+    pub spread: Vec<f64>,
 }
 
-/// Sums over one block: J'J, J'r, r'r.
-struct Block {
-    square: Vec<f64>,
-    slope: Vec<f64>,
-    /// Of each component.
-    errors: Vec<f64>,
-}
-
-/// Normal equations, block by block, each course with the same weight.
-struct Normal {
-    count: usize,
-    blocks: Vec<Block>,
-}
-
-impl Normal {
-    /// `[course][candidate]`: candidate 0 is the base, candidate j + 1 has slot j moved by `steps[j]`.
-    fn new(residuals: &[Vec<Residual>], steps: &[f64]) -> Self {
-        let count = steps.len();
-        let mut blocks = Vec::new();
-        for course in residuals {
-            let Some(base) = course.first().filter(|base| !base.of.is_empty()) else { continue };
-            let ticks = base.of.len() / base.components;
-            let weight = 1.0 / (ticks * residuals.len()) as f64;
-            let length = ((BLOCK_S / base.period_s) as usize).max(1) * base.components;
-            for start in (0..base.of.len()).step_by(length) {
-                let range = start..(start + length).min(base.of.len());
-                let mut block = Block {
-                    square: vec![0.0; count * count],
-                    slope: vec![0.0; count],
-                    errors: vec![0.0; base.components],
-                };
-                let mut derivatives = vec![0.0; count];
-                for at in range {
-                    let error = base.of[at];
-                    for (j, step) in steps.iter().enumerate() {
-                        derivatives[j] = (course[j + 1].of[at] - error) / step;
-                    }
-                    for i in 0..count {
-                        block.slope[i] += weight * derivatives[i] * error;
-                        for j in 0..=i {
-                            block.square[i * count + j] += weight * derivatives[i] * derivatives[j];
-                        }
-                    }
-                    block.errors[at % base.components] += weight * error * error;
-                }
-                for i in 0..count {
-                    for j in 0..i {
-                        block.square[j * count + i] = block.square[i * count + j];
-                    }
-                }
-                blocks.push(block);
+/// Bases with their derivatives, all in one run.
+pub(super) fn points(group: &Group<'_>, bases: Vec<Vec<Gains>>, theory: &[Gains]) -> Vec<Point> {
+    let mut candidates = Vec::new();
+    for base in &bases {
+        candidates.push(base.clone());
+        for (slot, step) in group.slots.iter().zip(difference_steps(group, base)) {
+            let (mut moved, value) = (base.clone(), group.value(base, slot) + step);
+            for member in &slot.members {
+                moved[*member] = moved[*member].with(slot.gain, value);
             }
+            candidates.push(moved);
         }
-        Self { count, blocks }
     }
-
-    /// Sums of the blocks named.
-    fn sums(&self, blocks: impl Iterator<Item = usize>) -> (Vec<f64>, Vec<f64>) {
-        let (mut square, mut slope) = (vec![0.0; self.count * self.count], vec![0.0; self.count]);
-        for block in blocks.filter_map(|block| self.blocks.get(block)) {
-            square.iter_mut().zip(&block.square).for_each(|(sum, part)| *sum += part);
-            slope.iter_mut().zip(&block.slope).for_each(|(sum, part)| *sum += part);
-        }
-        (square, slope)
-    }
-
-    /// Of one component, or of all.
-    fn error(&self, component: Option<usize>) -> f64 {
-        let of_block = |block: &Block| match component {
-            Some(component) => block.errors.get(component).copied().unwrap_or(0.0),
-            None => block.errors.iter().sum(),
-        };
-        self.blocks.iter().map(of_block).sum()
-    }
-}
-
-/// What a step is chosen from.
-struct Step<'n> {
-    normal: &'n Normal,
-    /// Preference: weight and distance of the present value from theory.
-    weights: Vec<f64>,
-    away: Vec<f64>,
-    /// Room to the bounds.
-    room: Vec<[f64; 2]>,
-}
-
-impl Step<'_> {
-    /// The step that makes ½ d'Hd + g'd least inside the bounds: coordinate by coordinate, which converges for a convex problem.
-    fn solve(&self, square: &[f64], slope: &[f64]) -> Vec<f64> {
-        let count = self.normal.count;
-        let mut step = vec![0.0; count];
-        for _ in 0..SWEEPS {
-            let mut moved = 0.0_f64;
-            for i in 0..count {
-                let own = square[i * count + i] + self.weights[i];
-                if own <= 0.0 {
-                    continue;
-                }
-                let others: f64 = (0..count).filter(|j| *j != i).map(|j| square[i * count + j] * step[j]).sum();
-                let wanted = -(slope[i] + self.weights[i] * self.away[i] + others) / own;
-                let new = wanted.clamp(self.room[i][0], self.room[i][1]);
-                moved = moved.max((new - step[i]).abs() / (self.room[i][1] - self.room[i][0]).max(f64::MIN_POSITIVE));
-                step[i] = new;
-            }
-            if moved < 1e-10 {
-                break;
-            }
-        }
-        step
-    }
-}
-
-/// Steps of the differences: away from the nearest bound; the delay not across a whole position cycle, where its effect bends.
-fn steps(group: &Group<'_>, gains: &[Gains]) -> Vec<f64> {
-    let step = |slot: &super::group::Slot| {
-        let (value, size) = (group.value(gains, slot), slot.gain.step(slot.range));
-        let up = match slot.gain {
-            Gain::Delay => {
-                let cycle_s = slot.members.first().map_or(1.0, |member| {
-                    group.machine.cycle.time_base.seconds(group.members[*member].data.position_cycle_ticks)
-                });
-                (value / cycle_s).fract() * cycle_s + size < cycle_s
-            }
-            _ => true,
-        };
-        let up = (up && value + size <= slot.range[1]) || value - size < slot.range[0];
-        if up { size } else { -size }
+    let residuals = group.residuals(&candidates);
+    let each = group.slots.len() + 1;
+    let point = |(number, gains): (usize, Vec<Gains>)| {
+        let own: Vec<&[Residual]> =
+            residuals.iter().map(|course| &course[number * each..(number + 1) * each]).collect();
+        let score = score(own.iter().filter_map(|course| course.first()));
+        let normal = Normal::around(group, &gains, &own);
+        let step = Step::new(group, &normal, &gains, theory).solve(&normal);
+        let predicted = group.slots.iter().zip(&step).map(|(slot, part)| group.value(&gains, slot) + part).collect();
+        Point { gains, score, normal, predicted, spread: step.iter().map(|part| part * part).collect() }
     };
-    group.slots.iter().map(step).collect()
+    bases.into_iter().enumerate().map(point).collect()
 }
 
-fn normal(group: &Group<'_>, gains: &[Gains]) -> Normal {
-    let steps = steps(group, gains);
-    let mut candidates = vec![gains.to_vec()];
-    for (slot, step) in group.slots.iter().zip(&steps) {
-        let mut moved = gains.to_vec();
-        let value = group.value(gains, slot) + step;
-        for member in &slot.members {
-            moved[*member] = moved[*member].with(slot.gain, value);
+/// A start on its way down.
+struct Descent {
+    best: Point,
+    /// Of the step that the model around `best` proposes.
+    share: f64,
+}
+
+impl Descent {
+    /// Where to look next; `None` if it has arrived.
+    fn next(&self, group: &Group<'_>) -> Option<Vec<Gains>> {
+        let Point { gains, predicted, .. } = &self.best;
+        let mut moved = gains.clone();
+        for (slot, predicted) in group.slots.iter().zip(predicted) {
+            let value = group.value(gains, slot);
+            group.put(&mut moved, slot, value + self.share * (predicted - value));
         }
-        candidates.push(moved);
+        (self.share >= LEAST_SHARE && !near(group, gains, &moved, DONE_SHARE)).then_some(moved)
     }
-    Normal::new(&group.residuals(&candidates), &steps)
-}
 
-fn step_from<'n>(group: &Group<'_>, normal: &'n Normal, gains: &[Gains], theory: &[Gains]) -> Step<'n> {
-    // Of the axis itself: a rotary axis has other numbers than a linear one of its group.
-    let scatter = |slot: &super::group::Slot| normal.error(group.component(slot)) / normal.blocks.len().max(1) as f64;
-    let width = |slot: &super::group::Slot| {
-        let steps = if slot.gain == Gain::Torque { 2.0 * PREFERENCE_STEPS } else { PREFERENCE_STEPS };
-        (steps * slot.gain.step(slot.range)).max(f64::MIN_POSITIVE)
-    };
-    Step {
-        normal,
-        weights: group.slots.iter().map(|slot| scatter(slot) / (width(slot) * width(slot))).collect(),
-        away: group.slots.iter().map(|slot| group.value(gains, slot) - group.value(theory, slot)).collect(),
-        room: group
-            .slots
-            .iter()
-            .map(|slot| [slot.range[0], slot.range[1]].map(|bound| bound - group.value(gains, slot)))
-            .collect(),
+    fn take(&mut self, point: Point) {
+        if point.score.mean_square < self.best.score.mean_square {
+            *self = Self { best: point, share: 1.0 };
+        } else {
+            self.share *= 0.5;
+        }
     }
 }
 
-/// The least mean square near a start, and its score.
-pub(super) fn gauss_newton(group: &Group<'_>, start: &[Gains], theory: &[Gains]) -> (Vec<Gains>, Score) {
-    let mut gains = start.to_vec();
-    for slot in &group.slots {
-        let inside = group.value(&gains, slot);
-        group.put(&mut gains, slot, inside);
-    }
-    let mut best = group.scores(std::slice::from_ref(&gains))[0];
-    for _ in 0..PASSES {
-        let normal = normal(group, &gains);
-        let step = step_from(group, &normal, &gains, theory);
-        let (square, slope) = normal.sums(0..normal.blocks.len());
-        let whole = step.solve(&square, &slope);
-        let candidates: Vec<Vec<Gains>> = STEP_SHARES
-            .iter()
-            .map(|share| {
-                let mut moved = gains.clone();
-                for (slot, part) in group.slots.iter().zip(&whole) {
-                    let inside = group.value(&gains, slot) + share * part;
-                    group.put(&mut moved, slot, inside);
+fn near(group: &Group<'_>, one: &[Gains], other: &[Gains], share: f64) -> bool {
+    group
+        .slots
+        .iter()
+        .all(|slot| (group.value(one, slot) - group.value(other, slot)).abs() <= share * slot.gain.step(slot.range))
+}
+
+/// The first start, and the least mean square reached from any. `None` without a start.
+pub(super) fn gauss_newton(group: &Group<'_>, starts: Vec<Vec<Gains>>, theory: &[Gains]) -> Option<(Point, Point)> {
+    let found = points(group, starts, theory);
+    let first = found.first()?.clone();
+    let seen = |point: &Point| (point.gains.clone(), point.predicted.clone());
+    let mut visited: Vec<(Vec<Gains>, Vec<f64>)> = found.iter().map(seen).collect();
+    let mut on_way: Vec<Descent> = found.into_iter().map(|best| Descent { best, share: 1.0 }).collect();
+    let mut arrived: Vec<Point> = Vec::new();
+    for _ in 1..PASSES {
+        // Of two that go to the same place the better one goes on.
+        on_way.sort_by(|one, other| one.best.score.mean_square.total_cmp(&other.best.score.mean_square));
+        let (mut going, mut bases) = (Vec::new(), Vec::<Vec<Gains>>::new());
+        for descent in on_way {
+            match descent.next(group) {
+                Some(next) if bases.iter().all(|other| !near(group, other, &next, SAME_SHARE)) => {
+                    bases.push(next);
+                    going.push(descent);
                 }
-                moved
-            })
-            .collect();
-        let scores = group.scores(&candidates);
-        let found =
-            (0..candidates.len()).min_by(|one, other| scores[*one].mean_square.total_cmp(&scores[*other].mean_square));
-        match found {
-            Some(place) if scores[place].mean_square < best.mean_square => {
-                best = scores[place];
-                gains.clone_from(&candidates[place]);
+                Some(_) => {}
+                None => arrived.push(descent.best),
             }
-            _ => break,
         }
+        on_way = going;
+        if bases.is_empty() {
+            break;
+        }
+        let found = points(group, bases, theory);
+        visited.extend(found.iter().map(seen));
+        on_way.iter_mut().zip(found).for_each(|(descent, point)| descent.take(point));
     }
-    (gains, best)
+    let all = arrived.into_iter().chain(on_way.into_iter().map(|descent| descent.best));
+    let mut best = all.min_by(|one, other| one.score.mean_square.total_cmp(&other.score.mean_square))?;
+    visited.retain(|(gains, _)| near(group, gains, &best.gains, NEIGHBOUR_STEPS));
+    for (place, slot) in group.slots.iter().enumerate() {
+        let value = group.value(&best.gains, slot);
+        let sum: f64 = visited.iter().map(|(_, predicted)| (predicted[place] - value).powi(2)).sum();
+        best.spread[place] = sum / visited.len().max(1) as f64;
+    }
+    Some((first, best))
 }
 
-/// Intervals of the slots around `gains`.
-pub(super) fn certainty(group: &Group<'_>, gains: &[Gains], theory: &[Gains]) -> Vec<Certainty> {
-    let normal = normal(group, gains);
-    let mut step = step_from(group, &normal, gains, theory);
-    // Without bounds: an interval that ends at one would look more certain than it is.
-    step.room.iter_mut().for_each(|room| *room = [-1e3, 1e3]);
-    let (all_square, all_slope) = normal.sums(0..normal.blocks.len());
-    let centre = step.solve(&all_square, &all_slope);
-    let mut random = 0x9E37_79B9_7F4A_7C15_u64;
-    let mut found: Vec<Vec<f64>> = vec![Vec::with_capacity(RESAMPLES); normal.count];
-    let blocks = normal.blocks.len().max(1);
-    for _ in 0..RESAMPLES {
-        let chosen: Vec<usize> = (0..blocks).map(|_| below(&mut random, blocks)).collect();
-        let (square, slope) = normal.sums(chosen.into_iter());
-        for (values, part) in found.iter_mut().zip(step.solve(&square, &slope)) {
-            values.push(part);
+/// The best of points spread over the bounds, if it is better than `than`.
+pub(super) fn scan(group: &Group<'_>, base: &[Gains], than: &Score) -> Option<Vec<Gains>> {
+    let point = |number: usize| {
+        let mut moved = base.to_vec();
+        for (slot, prime) in group.slots.iter().zip(PRIMES.iter().cycle()) {
+            let [low, high] = slot.range;
+            group.put(&mut moved, slot, low + (high - low) * radical_inverse(number as u32 + 1, *prime));
         }
-    }
-    let widening = widening(blocks);
-    let certainty = |(place, slot): (usize, &super::group::Slot)| {
-        let values = &mut found[place].clone();
-        values.sort_by(f64::total_cmp);
-        let at = |share: f64| values.get(((values.len() - 1) as f64 * share).round() as usize).copied().unwrap_or(0.0);
-        let value = group.value(gains, slot);
-        // Around the value that is written: what the last linear step says beside it is rounding and stick events.
-        let (low, high) = (value + at(0.025) - centre[place], value + at(0.975) - centre[place]);
-        let wider = |end: f64| value + widening * (end - value);
-        let own = all_square[place * normal.count + place];
-        let certain = own > step.weights[place] && high - low < TELLING_SHARE * (slot.range[1] - slot.range[0]);
-        Certainty { low: wider(low.min(value)), high: wider(high.max(value)), certain }
+        moved
     };
-    group.slots.iter().enumerate().map(certainty).collect()
+    let candidates: Vec<Vec<Gains>> = (0..SCAN_POINTS).map(point).collect();
+    let scores = group.scores(&candidates);
+    let best = (0..SCAN_POINTS).min_by(|one, other| scores[*one].mean_square.total_cmp(&scores[*other].mean_square))?;
+    (scores[best].mean_square < than.mean_square).then(|| candidates[best].clone())
 }
 
-/// A bootstrap of few blocks is too narrow: Student's quantile [Abramowitz 1964, 26.7.5] over that of the normal distribution, and the scatter
-/// with n - 1.
-fn widening(blocks: usize) -> f64 {
-    const NORMAL: f64 = 1.959_964;
-    let freedom = blocks.max(2) as f64 - 1.0;
-    let student = NORMAL + (2.372_3 + 2.822_5 / freedom) / freedom;
-    student / NORMAL * ((freedom + 1.0) / freedom).sqrt()
-}
-
-/// xorshift64*, below a count.
-fn below(state: &mut u64, count: usize) -> usize {
-    *state ^= *state >> 12;
-    *state ^= *state << 25;
-    *state ^= *state >> 27;
-    ((state.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize) % count.max(1)
+/// The digits of a number in a base, mirrored at the point.
+fn radical_inverse(mut number: u32, base: u32) -> f64 {
+    let (mut inverse, mut place) = (0.0, 1.0);
+    while number > 0 {
+        place /= f64::from(base);
+        inverse += place * f64::from(number % base);
+        number /= base;
+    }
+    inverse
 }

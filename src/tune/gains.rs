@@ -156,15 +156,21 @@ impl Gains {
     }
 }
 
-/// Lower and upper bound of a gain, inside.
-pub(super) fn range(options: &TuneOptions, gain: Gain, axis: &Axis, data: &DriveData) -> [f64; 2] {
+/// Lower and upper bound of a gain, inside. The delay of theory is about one position cycle and what the feed-forward waits.
+pub(super) fn range(
+    options: &TuneOptions,
+    gain: Gain,
+    axis: &Axis,
+    data: &DriveData,
+    position_cycle_s: f64,
+) -> [f64; 2] {
     if let Some((_, bounds)) = options.bounds.iter().find(|(bounded, _)| *bounded == gain) {
         return bounds.map(|bound| gain.inside(axis.kind, bound));
     }
     match gain {
         Gain::Velocity => [0.5, 1.5],
         Gain::Torque => [0.0, 2.0],
-        Gain::Delay => [0.0, 4.0 / MS_PER_S],
+        Gain::Delay => [0.0, (4.0 / MS_PER_S).max(2.0 * (position_cycle_s + data.feedforward_delay_s))],
         Gain::FrictionTime => [1.0 / MS_PER_S, 50.0 / MS_PER_S],
         // The speed that the speed controller lacks while it integrates from -Tc to Tc, twice over.
         Gain::Friction => {

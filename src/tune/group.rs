@@ -5,17 +5,20 @@
 //! [`LEVER_MM`]. New gains are taken only if they are better on the courses for tuning by more than chance: a paired
 //! look at blocks of [`BLOCK_S`] decides, and 2 % (contour: 10 %) are the least, so that tuning does not chase single friction events.
 
+use super::certainty::{Certainty, certainty};
 use super::contour::{Tool, moves_tool};
 use super::course::{AxisCourse, Course};
 use super::figures::{CourseFigures, Sensitivity, course_figures, sensitivities};
-use super::fit::{Certainty, certainty, gauss_newton};
+use super::fit::{Point, gauss_newton, points, scan};
 use super::gains::{Gain, Gains, range};
 use super::landscape::{Map, maps};
 use super::search::search;
 use super::simulate::{Job, calibrate, responses};
 use super::{Measure, Objective, TuneOptions};
+use crate::base::units::MS_PER_S;
 use crate::base::{AxisId, AxisKind, Diagnostic};
 use crate::machine::{DriveData, Machine};
+use rayon::prelude::*;
 
 /// Residuals further apart than this count as independent of each other.
 pub(super) const BLOCK_S: f64 = 0.25;
@@ -204,10 +207,18 @@ impl Group<'_> {
         self.simulations.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
         let simulated = responses(self.machine, &jobs);
         let of_course = |number: usize| &simulated[number * self.members.len()..(number + 1) * self.members.len()];
-        let all = self.courses.iter().enumerate().map(|(number, course)| {
-            places.iter().map(|place| self.residual(number, course, of_course(number), place)).collect()
-        });
-        all.collect()
+        let all: Vec<(usize, &Vec<usize>)> =
+            (0..self.courses.len()).flat_map(|number| places.iter().map(move |place| (number, place))).collect();
+        let residual = |(number, place): &(usize, &Vec<usize>)| {
+            self.residual(*number, &self.courses[*number], of_course(*number), place)
+        };
+        let mut residuals: Vec<Residual> = all.par_iter().map(residual).collect();
+        let mut by_course = Vec::with_capacity(self.courses.len());
+        for _ in self.courses {
+            let rest = residuals.split_off(candidates.len().min(residuals.len()));
+            by_course.push(std::mem::replace(&mut residuals, rest));
+        }
+        by_course
     }
 
     fn residual(
@@ -296,40 +307,70 @@ impl Group<'_> {
     }
 
     /// Whether new gains are better than old ones by more than chance.
-    fn better(&self, old: &[Gains], new: &[Gains]) -> bool {
-        let residuals = self.residuals(&[old.to_vec(), new.to_vec()]);
-        let scores: Vec<Score> = (0..2).map(|place| score(residuals.iter().map(|course| &course[place]))).collect();
+    fn better(&self, old: &Point, new: &Point) -> bool {
         if self.measure == Measure::Peak {
-            return self.figure(&scores[1]) < self.figure(&scores[0]);
+            return self.figure(&new.score) < self.figure(&old.score);
         }
         let worth = if self.objective == Objective::Contour { WORTH_CONTOUR_RATIO } else { WORTH_RATIO };
-        let mut differences = Vec::new();
-        for course in &residuals {
-            let block = ((BLOCK_S / course[0].period_s) as usize).max(1) * course[0].components;
-            let mean = |part: &[f64]| part.iter().map(|one| one * one).sum::<f64>() / part.len().max(1) as f64;
-            differences.extend(
-                course[0].of.chunks(block).zip(course[1].of.chunks(block)).map(|(old, new)| mean(old) - mean(new)),
-            );
-        }
+        let of_blocks = |point: &Point| -> Vec<f64> {
+            point.normal.blocks.iter().map(|block| block.errors.iter().sum::<f64>()).collect()
+        };
+        let differences: Vec<f64> = of_blocks(old).iter().zip(of_blocks(new)).map(|(old, new)| old - new).collect();
         let count = differences.len().max(2) as f64;
         let mean = differences.iter().sum::<f64>() / count;
         let variance = differences.iter().map(|one| (one - mean) * (one - mean)).sum::<f64>() / (count - 1.0);
-        scores[1].mean_square < worth * worth * scores[0].mean_square
+        new.score.mean_square < worth * worth * old.score.mean_square
             && mean > CERTAIN_ERRORS * (variance / count).sqrt()
+    }
+
+    /// Gains inside the bounds.
+    fn inside(&self, mut gains: Vec<Gains>) -> Vec<Gains> {
+        for slot in &self.slots {
+            for member in &slot.members {
+                let own = gains[*member].get(slot.gain).clamp(slot.range[0], slot.range[1]);
+                gains[*member] = gains[*member].with(slot.gain, own);
+            }
+        }
+        gains
+    }
+
+    /// The least mean square, from both starts and over the bounds; then the peak, and what is not affine.
+    fn found(&self, starts: Vec<Vec<Gains>>, theory: &[Gains]) -> Option<(Point, Point)> {
+        let (before, mut best) = gauss_newton(self, starts, theory)?;
+        if let Some(elsewhere) = scan(self, &best.gains, &best.score)
+            && let Some((_, other)) = gauss_newton(self, vec![elsewhere], theory)
+            && other.score.mean_square < best.score.mean_square
+        {
+            best = other;
+        }
+        let pulses = self.slots.iter().any(|slot| matches!(slot.gain, Gain::Friction | Gain::FrictionTime));
+        if self.measure == Measure::Peak || pulses {
+            let gains = search(self, best.gains.clone(), best.score);
+            if gains != best.gains {
+                best = points(self, vec![gains], theory).pop()?;
+            }
+        }
+        Some((before, best))
     }
 
     /// New gains, and how certain they are.
     fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, Option<&'static str>) {
-        let before = self.before();
+        let before = self.inside(self.before());
         let theory = self.theory();
-        let ends: Vec<(Vec<Gains>, Score)> =
-            [&before, &theory].into_iter().map(|start| gauss_newton(self, start, &theory)).collect();
-        let best = ends.into_iter().min_by(|one, other| self.figure(&one.1).total_cmp(&self.figure(&other.1)));
-        let found = best.map_or_else(|| before.clone(), |(gains, score)| search(self, gains, score));
-        let found = self.rounded(&found);
+        // Axes that had delays of their own start with one: that of the first.
+        let mut start = before.clone();
+        self.slots.iter().for_each(|slot| self.put(&mut start, slot, self.value(&before, slot)));
+        let own_delays = start != before;
+        let starts = if theory == start { vec![start] } else { vec![start, theory.clone()] };
+        let Some((mut old, new)) = self.found(starts, &theory) else { return (before, Vec::new(), None) };
+        if own_delays && let Some(point) = points(self, vec![before.clone()], &theory).pop() {
+            old = point;
+        }
+        let found = self.rounded(&new.gains);
+        let new_certainty = certainty(self, &new, &theory);
         // A common delay that the paths do not tell runs along the ridge of 7.3, and is wrong on the next program.
         let untold = self.objective == Objective::Contour
-            && certainty(self, &found, &theory)
+            && new_certainty
                 .iter()
                 .zip(&self.slots)
                 .any(|(certainty, slot)| slot.gain == Gain::Delay && !certainty.certain);
@@ -337,13 +378,18 @@ impl Group<'_> {
             Some("the best gains found are those of the machine")
         } else if untold {
             Some("the paths do not tell the common delay, and without it the other gains say nothing: kept")
-        } else if !self.better(&before, &found) {
+        } else if !self.better(&old, &new) {
             Some("no gains are better than those of the machine by more than chance, and by enough to last: kept")
         } else {
             None
         };
+        // Of gains that stay the interval is that of the best ones, and holds them.
         let gains = if kept.is_some() { before } else { found };
-        let certainty = certainty(self, &gains, &theory);
+        let extended = |(slot, certainty): (&Slot, Certainty)| {
+            let value = self.value(&gains, slot);
+            Certainty { low: certainty.low.min(value), high: certainty.high.max(value), ..certainty }
+        };
+        let certainty = self.slots.iter().zip(new_certainty).map(extended).collect();
         (gains, certainty, kept)
     }
 }
@@ -405,10 +451,33 @@ pub fn tune(
             warnings.push(Diagnostic::note("U0004", message).help(help));
         }
     }
+    warnings.extend(apart(machine, &after));
     tell("figures");
     let figures = course_figures(machine, &courses, &tool, &paths_mm, &after, options.objective);
     let sensitivities = sensitivities(machine, &courses[..training], &tool, &paths_mm, &after, options.objective);
     Ok(Tuned { axes, courses: figures, sensitivities, landscapes, warnings, simulations })
+}
+
+/// Axes that move the tool, were not tuned, and have another delay now than those that were: paths of both bend.
+fn apart(machine: &Machine, after: &[(AxisId, Gains)]) -> Option<Diagnostic> {
+    const SAME_S: f64 = 20e-6;
+    let (_, gains) = after.iter().find(|(axis, _)| moves_tool(machine, *axis))?;
+    let delay_s = gains.get(Gain::Delay);
+    let other = |axis: &AxisId| {
+        let data = machine.axis(*axis).drive.as_ref();
+        let differs = data.is_some_and(|data| (data.setpoint_delay_s - delay_s).abs() > SAME_S);
+        moves_tool(machine, *axis) && differs && after.iter().all(|(tuned, _)| tuned != axis)
+    };
+    let names: Vec<&str> = machine.axis_ids().filter(other).map(|axis| machine.axis(axis).name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        let message = format!(
+            "{}: not tuned, and the delay differs from the {:.3} ms of the axes that were: paths on which both move bend",
+            names.join(", "),
+            delay_s * MS_PER_S
+        );
+        let help = "tune on programs in which all axes of the tool move";
+        Diagnostic::warning("U0007", message).help(help)
+    })
 }
 
 /// Axes with a drive that move, one group or one each.
@@ -449,6 +518,7 @@ fn group<'a>(
         .filter_map(|id| {
             let axis = machine.axis(*id);
             let data = axis.drive.clone()?;
+            let position_cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
             let pulses = options.gains.contains(&Gain::Friction) || data.options.friction_pulse_lu_s > 0.0;
             let idle = |gain: &Gain| match gain {
                 Gain::Torque => data.feedforward_inertia_kg_m2 == 0.0,
@@ -459,7 +529,7 @@ fn group<'a>(
             let free = Gain::ALL.into_iter().filter(|gain| options.gains.contains(gain) && !idle(gain));
             // Without friction there is nothing to compensate.
             let ranges = free
-                .map(|gain| (gain, range(options, gain, axis, &data)))
+                .map(|gain| (gain, range(options, gain, axis, &data, position_cycle_s)))
                 .filter(|(_, range)| range[1] > range[0])
                 .collect();
             Some(Member { axis: *id, data, ranges })
@@ -497,13 +567,13 @@ fn tuned_axes(group: &Group<'_>, gains: &[Gains], certainty: &[Certainty]) -> Ve
                 gain: slot.gain,
                 before: shown(before[place].get(slot.gain)),
                 value: shown(inside),
-                // A value is rounded before it is written.
-                low: shown(certainty.low) - 0.5 / slot.gain.written_steps(),
-                high: shown(certainty.high) + 0.5 / slot.gain.written_steps(),
+                low: shown(certainty.low),
+                high: shown(certainty.high),
                 at_bound: inside <= slot.range[0] + margin || inside >= slot.range[1] - margin,
                 certain: certainty.certain,
             });
         }
+        of_axis.sort_by_key(|tuned| tuned.gain as usize);
         TunedAxis { axis: member.axis, name: name(place), kind, gains: of_axis, together }
     };
     group.members.iter().enumerate().map(of_member).collect()

@@ -10,8 +10,9 @@ use crate::base::units::deg_from_rad;
 
 /// Points in a row of a map: odd, so that the optimum is one of them.
 const POINTS: usize = 11;
-/// Steps of a search to either side.
-const REACH_STEPS: f64 = 5.0;
+/// Steps of a search to either side; the valley of velocity feed-forward is the narrowest.
+const REACH_STEPS: f64 = 2.5;
+const REACH_VELOCITY_STEPS: f64 = 1.0;
 
 /// The objective over two gains.
 #[derive(Clone, Debug)]
@@ -30,7 +31,8 @@ pub struct Map {
 pub(super) fn maps(group: &Group<'_>, gains: &[Gains]) -> Vec<Landscape> {
     let mut found = Vec::new();
     for (place, member) in group.members.iter().enumerate() {
-        let of_axis: Vec<&Slot> = group.slots.iter().filter(|slot| slot.members.contains(&place)).collect();
+        let mut of_axis: Vec<&Slot> = group.slots.iter().filter(|slot| slot.members.contains(&place)).collect();
+        of_axis.sort_by_key(|slot| slot.gain as usize);
         let Some((across, others)) = of_axis.split_first() else { continue };
         for up in others {
             let axis = group.machine.axis(member.axis);
@@ -43,7 +45,8 @@ pub(super) fn maps(group: &Group<'_>, gains: &[Gains]) -> Vec<Landscape> {
 
 fn map(group: &Group<'_>, gains: &[Gains], slots: [&Slot; 2], kind: AxisKind) -> Map {
     let line = |slot: &Slot| -> Vec<f64> {
-        let (centre, reach) = (group.value(gains, slot), REACH_STEPS * slot.gain.step(slot.range));
+        let steps = if slot.gain == Gain::Velocity { REACH_VELOCITY_STEPS } else { REACH_STEPS };
+        let (centre, reach) = (group.value(gains, slot), steps * slot.gain.step(slot.range));
         let [low, high] = [(centre - reach).max(slot.range[0]), (centre + reach).min(slot.range[1])];
         (0..POINTS).map(|point| low + (high - low) * point as f64 / (POINTS - 1) as f64).collect()
     };

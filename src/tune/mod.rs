@@ -4,12 +4,14 @@
 //! small. Out: [`Tuned`]: gains with their certainty, errors before and after on courses for tuning and on others, what friction leaves, what
 //! ±10 % of inertia and friction do. Only drives are simulated, many parameter sets side by side ([`crate::drive::DriveBatch`]).
 //!
-//! Between stick events the errors are affine in the gains (models/drive.md section 10): Gauss-Newton passes from two starts reach the least
-//! RMS; a search without derivatives follows, which sees stick events and can also make the peak small. What data cannot tell (the ridge of
+//! Between stick events the errors are affine in the gains (models/drive.md section 10): Gauss-Newton passes from two starts side by side reach
+//! the least RMS, points over the bounds show whether there is a better valley; a search without derivatives follows for the peak and for
+//! friction compensation, which is not affine. What data cannot tell (the ridge of
 //! section 7.3: velocity feed-forward and delay, seen from the position alone) is decided by a weak preference for what theory says
 //! (weight 1, the inertia of the model, the delay of 7.2). Writes no files; knows no NC language.
 
 mod apply;
+mod certainty;
 mod contour;
 mod course;
 mod document;
@@ -18,6 +20,7 @@ mod fit;
 mod gains;
 mod group;
 mod landscape;
+mod normal;
 mod search;
 mod simulate;
 

@@ -93,7 +93,7 @@ fn planned_programs_tell_the_drive_that_ran_them() {
 
 #[test]
 fn every_shipped_machine_gets_programs_that_run() {
-    for name in ["huron_kx10", "mikron_ucp710", "xyzbc"] {
+    for name in ["spinner_mvc850", "huron_kx10", "huron_kx8_five", "mikron_ucp710", "xyzbc"] {
         let loaded = machine::load(name, &[]).expect("a shipped machine");
         for program in plan(&loaded.machine, &[]) {
             let setup = Setup::from(ProgramSource::from_bytes(&program.name, program.text.as_bytes()));

@@ -176,6 +176,16 @@ const CASES: &[Case] = &[
     },
 ];
 
+/// Prints what the fit does, and when, with VERBOSE.
+fn progress() -> impl FnMut(&str) {
+    let (verbose, since) = (std::env::var("VERBOSE").is_ok(), std::time::Instant::now());
+    move |what| {
+        if verbose {
+            println!("    {:.1} s {what}", since.elapsed().as_secs_f64());
+        }
+    }
+}
+
 /// Fits a machine file to one program made by another control, and holds what it plans against that and other programs.
 fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
     let truth = machine("spinner_mvc850", truth);
@@ -185,7 +195,7 @@ fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
     let pairs: Vec<TracedProgram<'_>> =
         traces.iter().zip(&texts).map(|(trace, text)| TracedProgram { trace, setup: setup(text) }).collect();
     let result =
-        calibrate(&pairs[..1], &pairs[1..], &start, &mut |_| {}).unwrap_or_else(|d| panic!("{}", d.render(false)));
+        calibrate(&pairs[..1], &pairs[1..], &start, &mut progress()).unwrap_or_else(|d| panic!("{}", d.render(false)));
     for ((before, after), text) in result.agreements.iter().zip(&texts) {
         let percent = |a: &Agreement| 100.0 * (a.planned_s / a.traced_s - 1.0);
         println!(
@@ -214,7 +224,9 @@ fn every_control_is_found_and_predicts_unseen_programs() {
     let planned = plan(&start, &[]).into_iter().find(|program| program.name == "identify_control.mpf").unwrap().text;
     for case in CASES.iter().filter(|case| case.name.contains(&only)) {
         println!("{}", case.name);
-        let result = predicted(case.sets, &planned, &[UNSEEN, SHORT, POCKET]);
+        // `FITTED=1`: on the short program instead of the planned one.
+        let fitted = if std::env::var("FITTED").is_ok() { FITTED } else { &planned };
+        let result = predicted(case.sets, fitted, &[UNSEEN, SHORT, POCKET]);
         for e in &result.estimates {
             println!("    {} {:.4} [{:.4}, {:.4}]", e.key, e.value, e.low, e.high);
         }
@@ -244,6 +256,127 @@ fn a_control_with_other_settings_is_found_and_predicts_an_unseen_program() {
     assert!(result.choices.contains(&("feed.time_law", "seven-phase".to_owned())), "{:?}", result.choices);
     let (before, after) = result.agreements[1];
     assert!(after.path_rms_mm < 0.05 * before.path_rms_mm, "{after:?}, before {before:?}");
+}
+
+/// Few corners, with and without reversals, and corners of G64: quick to plan.
+const QUICK: &str =
+    "G642 CTOL=0.08 SOFT\nG1 X8 F3000\nX13 Y5\nX4 Y9\nX-2 Y3\nX3 Y0\nG64 F1500\nX8 Y1\nX12 Y4\nX12 Y9\nM30\n";
+
+/// Pairs of a truth, the shipped file to begin from, the time and feed of the unseen program.
+fn quickly(truth: &[&str], fitted: &str) -> ControlResult {
+    predicted(truth, fitted, &[UNSEEN])
+}
+
+#[test]
+#[ignore = "ten seconds"]
+fn the_continuous_law_with_other_jerks_is_found() {
+    let result = quickly(CASES[1].sets, QUICK);
+    assert!(result.choices.contains(&("feed.time_law", "continuous".to_owned())), "{:?}", result.choices);
+}
+
+#[test]
+#[ignore = "ten seconds"]
+fn jerks_of_their_own_for_each_axis_are_found() {
+    let result = quickly(CASES[2].sets, FITTED);
+    for (key, value) in [("axes.X.jerk_max factor", 2.0), ("axes.Y.jerk_max factor", 1.0 / 1.5)] {
+        let estimate = result.estimates.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{key}: {result:?}"));
+        assert!((estimate.value / value - 1.0).abs() < 0.03, "{estimate:?}, truth {value}");
+    }
+}
+
+/// Blocks shorter than the way to stop: what a look-ahead of 25 blocks does to them.
+const WINDOWED: &str = "G642 CTOL=0.05 SOFT\nG1 X6 F3000\nX9 Y4\nG64 F9000\nR1=0\nAA:\nX=9+R1*0.3 Y=4+0.001*(R1 MOD 2)\nR1=R1+1\nIF R1<90 GOTOB AA\nG642\nX30 Y8\nM30\n";
+
+#[test]
+#[ignore = "ten seconds"]
+fn a_look_ahead_of_25_blocks_is_found() {
+    // The same kind of blocks, shorter and slower, the other way.
+    let unseen = WINDOWED.replace("R1*0.3", "R1*0.25").replace("F9000", "F7500").replace("X30", "X28");
+    let result = predicted(CASES[4].sets, WINDOWED, &[&unseen]);
+    let window = result.estimates.iter().find(|e| e.key == "look_ahead.blocks").unwrap_or_else(|| panic!("{result:?}"));
+    assert!((24.0..=26.0).contains(&window.value), "{window:?}");
+}
+
+#[test]
+fn another_blend_law_is_found() {
+    let result = quickly(CASES[6].sets, QUICK);
+    assert!(result.choices.contains(&("smoothing.blend_law", "entry".to_owned())), "{:?}", result.choices);
+}
+
+/// The trace of set-points as that of a control that records the feed along the path alone.
+fn feed_alone(trace: &Trace) -> Trace {
+    let columns: Vec<&Vec<f64>> = trace.signals.iter().map(|signal| &signal.values).collect();
+    let TimeGrid::Uniform { step_ns, .. } = trace.signals[0].times else { panic!("a uniform grid") };
+    let way = |k: usize| columns.iter().map(|column| (column[k + 1] - column[k]).powi(2)).sum::<f64>().sqrt();
+    let feeds: Vec<f64> = (0..columns[0].len() - 1).map(|k| way(k) / (step_ns * 1e-9) * 60.0).collect();
+    let times = TimeGrid::Uniform { start_ns: 0.5 * step_ns, step_ns, count: feeds.len() };
+    let name = "path.feed_mm_min".to_owned();
+    let signal = Signal { name: Some(name.clone()), original: name, values: feeds, times, ..trace.signals[0].clone() };
+    Trace { name: "feed alone".to_owned(), signals: vec![signal], ..Trace::default() }
+}
+
+#[test]
+fn the_feed_alone_calibrates_too() {
+    let (truth, start) = (machine("spinner_mvc850", CASES[0].sets), machine("spinner_mvc850", &[]));
+    let [fitted, unseen] = [QUICK, UNSEEN].map(|text| feed_alone(&traced(&truth, text)));
+    let pairs = [(&fitted, QUICK), (&unseen, UNSEEN)].map(|(trace, text)| TracedProgram { trace, setup: setup(text) });
+    let result =
+        calibrate(&pairs[..1], &pairs[1..], &start, &mut progress()).unwrap_or_else(|d| panic!("{}", d.render(false)));
+    for (before, after) in &result.agreements {
+        assert!((after.planned_s / after.traced_s - 1.0).abs() < 0.01, "{after:?}");
+        assert!(after.feed_rms_share < 0.03 && after.feed_rms_share < 0.3 * before.feed_rms_share, "{after:?}");
+        assert!(after.path_rms_mm.is_nan());
+    }
+}
+
+/// Another clock, standstill in front and behind, and every second set-point only.
+fn late_and_coarse(trace: &Trace) -> Trace {
+    let one = |signal: &Signal| {
+        let TimeGrid::Uniform { step_ns, .. } = signal.times else { panic!("a uniform grid") };
+        let (first, last) = (signal.values[0], signal.values[signal.values.len() - 1]);
+        let held = std::iter::repeat_n(first, 301).chain(signal.values.iter().copied());
+        let values: Vec<f64> = held.chain(std::iter::repeat_n(last, 200)).step_by(2).collect();
+        let times = TimeGrid::Uniform { start_ns: 8.64e13 + 12_345.0, step_ns: 2.0 * step_ns, count: values.len() };
+        Signal { values, times, ..signal.clone() }
+    };
+    Trace { signals: trace.signals.iter().map(one).collect(), ..trace.clone() }
+}
+
+#[test]
+fn two_programs_are_fitted_together_and_clocks_may_stand_apart() {
+    let (truth, start) = (machine("spinner_mvc850", CASES[0].sets), machine("spinner_mvc850", &[]));
+    let traces = [traced(&truth, QUICK), late_and_coarse(&traced(&truth, UNSEEN)), traced(&truth, FITTED)];
+    let pairs: Vec<TracedProgram<'_>> = traces
+        .iter()
+        .zip([QUICK, UNSEEN, FITTED])
+        .map(|(trace, text)| TracedProgram { trace, setup: setup(text) })
+        .collect();
+    let result =
+        calibrate(&pairs[..2], &pairs[2..], &start, &mut progress()).unwrap_or_else(|d| panic!("{}", d.render(false)));
+    assert_eq!((result.fitted, result.agreements.len(), result.feeds.len()), (2, 3, 3));
+    for (_, after) in &result.agreements {
+        assert!((after.planned_s / after.traced_s - 1.0).abs() < 0.01, "{after:?}");
+        assert!(after.feed_rms_share < 0.03, "{after:?}");
+    }
+}
+
+#[test]
+fn the_file_of_another_machine_is_refused_with_advice() {
+    let fast = ["axes.X.velocity_max_m_min=40", "axes.X.acceleration_max_m_s2=4", "axes.X.jerk_max_m_s3=200"];
+    let text = "G642 CTOL=0.08 SOFT\nG1 X200 F35000\nX100 Y20\nX0\nM30\n";
+    let trace = traced(&machine("spinner_mvc850", &fast), text);
+    let pair = TracedProgram { trace: &trace, setup: setup(text) };
+    let start = machine("spinner_mvc850", &[]);
+    let finding = calibrate(std::slice::from_ref(&pair), &[], &start, &mut |_| {}).expect_err("another machine");
+    assert_eq!(finding.code, "T0208");
+    assert!(finding.message.contains("moves X at") && finding.render(false).contains("machine file"), "{finding:?}");
+    // One that is slower for another reason: an override of 40 %, which no setting explains.
+    let slow = FITTED.replace("F3000", "F1200");
+    let trace = traced(&start, &slow);
+    let pair = TracedProgram { trace: &trace, setup: setup(FITTED) };
+    let finding = calibrate(std::slice::from_ref(&pair), &[], &start, &mut progress()).expect_err("another feed");
+    assert_eq!(finding.code, "T0208");
+    assert!(finding.render(false).contains("override"), "{finding:?}");
 }
 
 #[test]

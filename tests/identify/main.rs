@@ -6,9 +6,12 @@ mod random;
 mod test_machine;
 
 mod chain;
+mod command;
 mod control;
+mod machines;
 mod made;
 mod other_plant;
 mod refusals;
 mod speed_loop;
+mod stranger;
 mod trust;

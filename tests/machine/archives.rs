@@ -302,10 +302,7 @@ fn the_last_of_two_assignments_counts_and_latin_1_is_read() {
 }
 
 #[test]
-fn inches_and_units_of_its_own_are_refused() {
-    let inch = "N10240 $MN_SCALING_SYSTEM_IS_METRIC=0\n";
-    assert_eq!(codes(&format!("{inch}{PLAIN}")), ["M0305"]);
-    assert!(codes(&format!("METRIC\n{inch}{PLAIN}")).is_empty(), "the line METRIC says what the values are");
+fn units_of_its_own_are_refused() {
     let own = |mask: &str, place: u32, factor: f64| {
         format!(
             "{PLAIN}N32200 $MA_POSCTRL_GAIN[0,AX1]=3\nN10220 $MN_SCALING_USER_DEF_MASK='{mask}'\nN10230 $MN_SCALING_FACTORS_USER_DEF[{place}]={factor}\n"
@@ -318,6 +315,149 @@ fn inches_and_units_of_its_own_are_refused() {
     let gain = |text: &str| import(&format!("{text}{drive}")).values["axes.X.drive.position_gain_per_s"].value.clone();
     assert_eq!(gain(&own("H200", 9, 16.666_666_67)), "50.0", "as delivered");
     assert_eq!(gain(&own("H200", 9, 1.0)), "3.0", "in 1/s");
+}
+
+#[test]
+fn inches_are_converted_and_said() {
+    let values = |text: &str| -> Vec<(String, String)> {
+        let imported = import(text);
+        assert_eq!(
+            said(&imported, "the listing is in inches"),
+            text.contains("inch") || text.contains("INCH"),
+            "{text}"
+        );
+        imported.values.iter().map(|(key, one)| (key.clone(), one.value.clone())).collect()
+    };
+    let more = "\
+N30300 $MA_IS_ROT_AX[AX3]=1
+N32000 $MA_MAX_AX_VELO[AX3]=20
+N32300 $MA_MAX_AX_ACCEL[0,AX3]=5
+N36100 $MA_POS_LIMIT_MINUS[AX1]=-254
+N36110 $MA_POS_LIMIT_PLUS[AX1]=508
+N42465 $SC_SMOOTH_CONTUR_TOL=0.0508
+N33120 $MA_PATH_TRANS_POS_TOL[AX1]=0.0127
+";
+    let metric = format!("{PLAIN}{more}");
+    // Written by hand: 40000 mm/min, 6 m/s², 30 m/s³ and so on in inches; nothing of the rotary axis changes.
+    let imperial = [
+        ("[AX1]=40000", "[AX1]=1574.8031496062993"),
+        ("[AX2]=30000", "[AX2]=1181.1023622047244"),
+        ("[0,AX1]=6\n", "[0,AX1]=236.22047244094488\n"),
+        ("[4,AX1]=4\n", "[4,AX1]=157.48031496062993\n"),
+        ("[0,AX1]=30\n", "[0,AX1]=1181.1023622047244\n"),
+        ("[0,AX2]=5\n", "[0,AX2]=196.8503937007874\n"),
+        ("[0,AX2]=20\n", "[0,AX2]=787.4015748031496\n"),
+        ("[AX1]=-254", "[AX1]=-10"),
+        ("[AX1]=508", "[AX1]=20"),
+        ("=0.0508", "=0.002"),
+        ("=0.0127", "=0.0005"),
+    ]
+    .iter()
+    .fold(metric.clone(), |text, (from, to)| {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        text.replace(from, to)
+    });
+    let wanted = values(&metric);
+    assert!(wanted.iter().any(|(key, value)| key == "axes.X.travel_mm" && value == "[-254.0, 508.0]"), "{wanted:?}");
+    for head in
+        ["INCH\n", "N10240 $MN_SCALING_SYSTEM_IS_METRIC=0 ; inch\n", "inch\nN10250 $MN_SCALING_VALUE_INCH=25.4\n"]
+    {
+        for ((key, wanted), (other, found)) in wanted.iter().zip(values(&format!("{head}{imperial}"))) {
+            assert_eq!(*key, other);
+            let numbers = |text: &str| -> Vec<f64> {
+                text.trim_matches(['[', ']']).split(", ").filter_map(|one| one.parse().ok()).collect()
+            };
+            let near =
+                numbers(wanted).iter().zip(numbers(&found)).all(|(one, other)| (one / other - 1.0).abs() < 1e-12);
+            assert!(near && (numbers(wanted).len() == numbers(&found).len()), "{key}: {wanted} {found}");
+        }
+    }
+    // A line METRIC says what the values are, whatever the control works in.
+    assert_eq!(values(&format!("METRIC\nN10240 $MN_SCALING_SYSTEM_IS_METRIC=0\n{metric}")), wanted);
+    assert_eq!(codes(&format!("INCH\nN10250 $MN_SCALING_VALUE_INCH=0\n{PLAIN}")), ["M0305"]);
+}
+
+#[test]
+fn sums_behind_lines_are_passed_over_and_said() {
+    // MD11230 is delivered so that every line has one.
+    let summed: String = PLAIN.lines().map(|line| format!("{line} '38c0\n")).collect();
+    let (imported, plain) = (import(&summed), import(PLAIN));
+    let values = |imported: &Imported| -> Vec<(String, String)> {
+        imported.values.iter().map(|(key, one)| (key.clone(), one.value.clone())).collect()
+    };
+    assert_eq!(values(&imported), values(&plain));
+    assert!(said(&imported, "9 lines carry a sum"), "{:?}", imported.warnings);
+    // What only looks like one is none.
+    assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1]=7 '38c0a\n")), ["M0304"]);
+    let hexadecimal = import(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1]='H7' 'ff\n"));
+    assert_eq!(hexadecimal.values["axes.X.acceleration_max_m_s2"].value, "7.0");
+}
+
+#[test]
+fn two_axes_in_one_bracket_are_no_address() {
+    assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[u1,AX1]=7\n")), ["M0304"]);
+    assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1]=\n")), ["M0304"]);
+    assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1] |= 7\n")), ["M0304"]);
+    assert!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL [ 0 , ax1 ] = 7\n")).is_empty());
+}
+
+#[test]
+fn a_kinematic_chain_is_said_once() {
+    let chain = "$NK_NAME[0]=\"ROOT\" '38c0\n$NK_NEXT[0]=\"X\"\n$NK_OFF_DIR[1,0]=1\n$NT_NAME[0]=\"TRAORI\"\n";
+    let imported = import(&format!("{PLAIN}{chain}"));
+    assert!(
+        said(&imported, "a kinematic chain (3 data $NK_, 1 data $NT_) is not taken over"),
+        "{:?}",
+        imported.warnings
+    );
+    let about = imported.warnings.iter().filter(|warning| warning.message.contains("$NK_")).count();
+    assert_eq!(about, 1);
+}
+
+/// A zip with stored members.
+fn zipped(members: &[(&str, &[u8])]) -> Vec<u8> {
+    use std::io::Write;
+    let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, bytes) in members {
+        writer.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        writer.write_all(bytes).unwrap();
+    }
+    writer.finish().unwrap().into_inner()
+}
+
+#[test]
+fn a_zip_is_unpacked_and_a_damaged_one_refused() {
+    let program = b"N10 $MA_MAX_AX_ACCEL[0,AX1]=99\nM30\n";
+    let drive = "p0199[0]=88\np1460[0]=5\n";
+    let bytes = zipped(&[
+        ("NCU_NCU1/NCK_1/cfg/ncdata/initial.ini", PLAIN.as_bytes()),
+        ("NCU_NCU1/NCK_1/mpf/test.mpf", program),
+        ("NCU_NCU1/DRV_1/3/15/PS000003.TEA", drive.as_bytes()),
+    ]);
+    let read =
+        |bytes: Vec<u8>| import_listing(&[ListingFile { name: "Backup.dsf".into(), bytes }], &ImportOptions::default());
+    let imported = read(bytes.clone()).unwrap();
+    assert_eq!(imported.values["axes.X.acceleration_max_m_s2"].value, "6.0");
+    assert_eq!(imported.values["axes.X.drive.speed_gain_n_m_s_per_rad"].value, "5.0");
+    for end in (0..bytes.len()).step_by(7) {
+        let refused = read(bytes[..end].to_vec()).unwrap_err();
+        let wanted = if end < 4 { ["M0301"] } else { ["M0302"] };
+        assert_eq!(refused.iter().map(|finding| finding.code).collect::<Vec<_>>(), wanted, "cut at {end}");
+    }
+}
+
+#[test]
+fn marks_of_the_encoding_are_no_data() {
+    let read = |bytes: Vec<u8>| {
+        import_listing(&[ListingFile { name: "a.ini".into(), bytes }], &ImportOptions::default()).unwrap()
+    };
+    let with_mark = [b"\xef\xbb\xbf".as_slice(), PLAIN.as_bytes()].concat();
+    let wide = |order: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        std::iter::once(0xfeff).chain(PLAIN.encode_utf16()).flat_map(order).collect()
+    };
+    for bytes in [with_mark, wide(u16::to_le_bytes), wide(u16::to_be_bytes)] {
+        assert_eq!(read(bytes).values["axes.X.velocity_max_m_min"].value, "40.0");
+    }
 }
 
 #[test]

@@ -297,11 +297,11 @@ fn an_archive_gives_its_text_members_and_names_the_compiled_ones() {
 #[test]
 fn bad_input_is_refused_with_its_place() {
     assert_eq!(codes("G1 X10\nM30\n"), ["M0301"]);
-    assert_eq!(codes(&BY_HAND.replace("METRIC", "INCH")), ["M0305"]);
+    assert_eq!(codes(&BY_HAND.replace("METRIC", "INCH\nN10250 $MN_SCALING_VALUE_INCH=-1")), ["M0305"]);
     assert_eq!(codes(&BY_HAND.replace("AX_VELO[AX1]=40000", "AX_VELO[AX1]=forty")), ["M0304"]);
     assert_eq!(codes(&BY_HAND.replace("AX_VELO[AX1]=40000", "AX_VELO[AX1=40000")), ["M0304"]);
     let zip = ListingFile { name: "all.zip".into(), bytes: b"PK\x03\x04\0\0\0".to_vec() };
-    assert_eq!(import_listing(&[zip], &ImportOptions::default()).unwrap_err()[0].code, "M0303");
+    assert_eq!(import_listing(&[zip], &ImportOptions::default()).unwrap_err()[0].code, "M0302");
     let findings =
         import_listing(&[file("data.ini", &BY_HAND.replace("[0,AX1]=6", "[0,AX1]=six"))], &ImportOptions::default())
             .unwrap_err();

@@ -2,6 +2,8 @@
 
 #[path = "../random/mod.rs"]
 mod random;
+mod foreign;
+mod odd;
 mod trust;
 
 use random::Random;

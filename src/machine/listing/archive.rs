@@ -4,9 +4,10 @@
 //! the member, filled up to the next block. In the header: name on the control at 0, name on a PC at 50 (50 bytes each, ended by 0),
 //! and, as decimal digits, the size at 124, the time at 136, and at 148 the sum of all other bytes of the header. So read from archives
 //! of two controls (840D sl, Operate 4.x), of which one was damaged by a transfer as text: there the sums no longer hold, and nothing is
-//! guessed. What a member holds is not looked at here.
+//! guessed. A zip (`.dsf`) is unpacked, too. What a member holds is not looked at here.
 
 use crate::base::Diagnostic;
+use std::io::{Cursor, Read};
 
 /// How the container begins.
 const MAGIC: &[u8] = b"@@MMCIBN";
@@ -25,6 +26,42 @@ pub(super) struct Member<'b> {
     pub bytes: &'b [u8],
 }
 
+/// Most bytes that come out of a zip.
+const UNPACKED_MAX: u64 = 1 << 29;
+
+/// A zip, as the newer controls (`.dsf`) and many people pack their data.
+pub(super) fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
+}
+
+/// The members of a zip that are wanted by their name, with their bytes, in order of their names: those of drives last.
+pub(super) fn unzipped(
+    file: &str,
+    bytes: &[u8],
+    wanted: impl Fn(&str) -> bool,
+) -> Result<Vec<(String, Vec<u8>)>, Diagnostic> {
+    let damaged = |reason: String| {
+        let message = format!("the archive `{file}` cannot be unpacked: {reason}");
+        Diagnostic::error("M0302", message).help("copy it again as binary, or unpack it and name the listings inside")
+    };
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| damaged(error.to_string()))?;
+    let named = |place: usize| archive.name_for_index(place)?.ok().map(|name| (place, name.into_owned()));
+    let mut names: Vec<(usize, String)> =
+        (0..archive.len()).filter_map(named).filter(|(_, name)| wanted(name)).collect();
+    names.sort_by_key(|(_, name)| (name.to_ascii_uppercase().contains("/DRV"), name.clone()));
+    let (mut found, mut left) = (Vec::with_capacity(names.len()), UNPACKED_MAX);
+    for (place, name) in names {
+        let member = archive.by_index(place).map_err(|error| damaged(format!("{name}: {error}")))?;
+        let mut content = Vec::new();
+        let read = member.take(left + 1).read_to_end(&mut content);
+        let read = read.map_err(|error| damaged(format!("{name}: {error}")))? as u64;
+        left =
+            left.checked_sub(read).ok_or_else(|| damaged(format!("more than {UNPACKED_MAX} bytes come out of it")))?;
+        found.push((name, content));
+    }
+    Ok(found)
+}
+
 /// Whether the bytes are such a container.
 pub(super) fn is_archive(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
@@ -32,8 +69,7 @@ pub(super) fn is_archive(bytes: &[u8]) -> bool {
 
 /// All members in order; markers without content are left out.
 pub(super) fn members<'b>(file: &str, bytes: &'b [u8]) -> Result<Vec<Member<'b>>, Diagnostic> {
-    let mut found = Vec::new();
-    let mut at = 0;
+    let (mut found, mut at) = (Vec::new(), 0);
     while let Some(header) = bytes.get(at..at + BLOCK) {
         if header.iter().all(|byte| *byte == 0) {
             at += BLOCK;
@@ -55,6 +91,10 @@ pub(super) fn members<'b>(file: &str, bytes: &'b [u8]) -> Result<Vec<Member<'b>>
             found.push(Member { name: name(header), bytes: content });
         }
         at = start + size.div_ceil(BLOCK) * BLOCK;
+    }
+    if bytes.get(at..).is_some_and(|rest| rest.iter().any(|byte| *byte != 0)) {
+        let message = format!("the archive `{file}` ends inside the header of a member, at byte {at}");
+        return Err(Diagnostic::error("M0302", message).help("copy it again; the file on the control is longer"));
     }
     Ok(found)
 }

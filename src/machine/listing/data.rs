@@ -90,6 +90,8 @@ pub(super) struct Listing {
     pub inch: Option<Spot>,
     /// A line says that the values are metric.
     pub metric: bool,
+    /// Lines with a sum behind them, which nobody here can check.
+    pub summed_lines: usize,
 }
 
 /// The parameters of one drive.
@@ -184,6 +186,16 @@ impl Listing {
     /// The place of a datum, for a finding.
     pub fn spot(&mut self, scope: Scope, name: &str, axes: &[String], index: u32) -> Option<Spot> {
         self.at(scope, name, axes, index).map(|(datum, _)| datum.spot.clone())
+    }
+
+    /// Multiplies all numbers of a datum, of these axes (of none: one empty name).
+    pub fn scale(&mut self, scope: Scope, name: &str, axes: &[String], factor: f64) {
+        let Some(addresses) = self.data.get_mut(&(scope, name.to_owned())) else { return };
+        for (_, datum) in addresses.iter_mut().filter(|((axis, _), _)| axes.contains(axis)) {
+            if let Literal::Number(value) = &mut datum.literal {
+                *value *= factor;
+            }
+        }
     }
 
     /// Every axis that has data, in order of its name.

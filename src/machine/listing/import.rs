@@ -98,7 +98,7 @@ pub(super) struct Draft<'l> {
 /// Two numbers are the same datum: a listing rounds.
 const SAME_RATIO: f64 = 1e-9;
 
-/// Imports. Errors: unreadable files, listings in inches, values that make no machine.
+/// Imports. Errors: unreadable files, listings in units of their own, values that make no machine.
 pub fn import_listing(files: &[ListingFile], options: &ImportOptions) -> Result<Imported, Vec<Diagnostic>> {
     let mut listing = lines::read(files)?;
     let mut draft = Draft { listing: &mut listing, options, values: BTreeMap::new(), warnings: Vec::new() };
@@ -112,8 +112,9 @@ pub fn import_listing(files: &[ListingFile], options: &ImportOptions) -> Result<
         let source = format!("{}:{}", spot.file, spot.line);
         draft.put(&key, value, Origin::Carried, source);
     }
-    let gain_per_s = beyond::units(&mut draft).map_err(|finding| vec![finding])?;
-    draft.fill(gain_per_s)?;
+    let units = beyond::units(&mut draft).map_err(|finding| vec![finding])?;
+    draft.fill(&units)?;
+    beyond::passed_over(&mut draft);
     let Draft { values, mut warnings, .. } = draft;
     let text = write::text(&values);
     let name = options.name.as_ref().or(options.stand_in.as_ref()).map_or("imported machine", String::as_str);
@@ -131,12 +132,15 @@ pub fn import_listing(files: &[ListingFile], options: &ImportOptions) -> Result<
 }
 
 impl Draft<'_> {
-    fn fill(&mut self, gain_per_s: Option<f64>) -> Result<(), Vec<Diagnostic>> {
+    fn fill(&mut self, units: &beyond::Units) -> Result<(), Vec<Diagnostic>> {
         let axes = axes::find(self)?;
+        if let Some(inch_mm) = units.inch_mm {
+            beyond::from_inches(self, &axes, inch_mm);
+        }
         scalar::control(self);
         special::control(self, &axes);
         for axis in &axes {
-            scalar::axis(self, axis, gain_per_s);
+            scalar::axis(self, axis, units.gain_per_s);
             special::axis(self, axis);
         }
         five_axis::import(self, &axes);

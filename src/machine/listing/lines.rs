@@ -1,10 +1,10 @@
 //! From text to assignments.
 //!
 //! In: files, archives taken apart. Out: [`Listing`]. Known lines: `N32300 $MA_MAX_AX_ACCEL[0,AX1]=6` with or without the number,
-//! `p1460[0]=5`, `CHANDATA(1)`, `INCH`, comments of ours; everything else is counted. A line that begins like an assignment and is none is
+//! `p1460[0]=5`, `CHANDATA(1)`, `INCH`, comments of ours, each with or without a sum behind it (`'38c0`); everything else is counted. A line that begins like an assignment and is none is
 //! an error with its place: a number that cannot be read must not be passed over. Values are not judged.
 
-use super::archive::{is_archive, members};
+use super::archive::{is_archive, is_zip, members, unzipped};
 use super::data::{Datum, DriveObject, Listing, Literal, Scope, Spot};
 use super::{CARRIED, ListingFile, digital};
 use crate::base::Diagnostic;
@@ -24,13 +24,14 @@ pub(super) fn read(files: &[ListingFile]) -> Result<Listing, Vec<Diagnostic>> {
     let mut reader = Reader::default();
     for file in files {
         if is_archive(&file.bytes) {
-            let found = members(&file.name, &file.bytes).map_err(|finding| vec![finding])?;
-            for member in found.iter().filter(|member| of_interest(member.name)) {
-                let name = format!("{}/{}", file.name, member.name);
-                if is_text(member.bytes) {
-                    reader.text(&name, &decoded(member.bytes));
+            reader.archive(&file.name, &file.bytes).map_err(|finding| vec![finding])?;
+        } else if is_zip(&file.bytes) {
+            for (name, bytes) in unzipped(&file.name, &file.bytes, of_interest).map_err(|finding| vec![finding])? {
+                let shown = format!("{}/{name}", file.name);
+                if is_archive(&bytes) {
+                    reader.archive(&shown, &bytes).map_err(|finding| vec![finding])?;
                 } else {
-                    reader.listing.binary.push(member.name.to_owned());
+                    reader.member(&shown, &name, &bytes);
                 }
             }
         } else if is_text(&file.bytes) {
@@ -53,31 +54,40 @@ pub(super) fn read(files: &[ListingFile]) -> Result<Listing, Vec<Diagnostic>> {
 }
 
 fn binary(file: &ListingFile) -> Diagnostic {
-    let (what, help) = if file.bytes.starts_with(b"PK\x03\x04") {
-        ("a zip file", "unpack it, and import the archive or the listing inside")
-    } else {
-        (
-            "binary, and no archive that begins with @@MMCIBN",
-            "save the machine data as text (ASCII): of the NC as INI or TEA, of the drives as ASCII archive",
-        )
-    };
-    Diagnostic::error("M0303", format!("`{}` is {what}", file.name)).help(help)
+    let message = format!("`{}` is binary, and no archive that begins with @@MMCIBN", file.name);
+    let help = "save the machine data as text (ASCII): of the NC as INI or TEA, of the drives as ASCII archive";
+    Diagnostic::error("M0303", message).help(help)
 }
 
 /// Members that may hold machine data; programs and cycles read them and do not set them.
 fn of_interest(name: &str) -> bool {
     let upper = name.to_ascii_uppercase();
-    ["_INI", "_TEA", ".INI", ".TEA", "_TEX", "_ACX", ".ACX", "_TXT", "_TOA", "_BOT"]
+    ["_INI", "_TEA", ".INI", ".TEA", "_TEX", "_ACX", ".ACX", "_TXT", "_TOA", "_BOT", ".ARC"]
         .iter()
         .any(|end| upper.ends_with(end))
 }
 
-fn is_text(bytes: &[u8]) -> bool {
-    !bytes.iter().take(HEAD).any(|byte| *byte == 0)
+/// Text in two bytes a character opens with a mark that says which of them is first.
+fn is_wide(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff])
 }
 
-/// UTF-8, else Latin-1.
+fn is_text(bytes: &[u8]) -> bool {
+    is_wide(bytes) || !bytes.iter().take(HEAD).any(|byte| *byte == 0)
+}
+
+/// UTF-16 behind its mark, UTF-8, else Latin-1.
 fn decoded(bytes: &[u8]) -> String {
+    if is_wide(bytes) {
+        let little = bytes[0] == 0xff;
+        let unit = |pair: &[u8]| match pair {
+            [one, other] if little => u16::from_le_bytes([*one, *other]),
+            [one, other] => u16::from_be_bytes([*one, *other]),
+            _ => 0,
+        };
+        let units: Vec<u16> = bytes.chunks(2).skip(1).map(unit).collect();
+        return String::from_utf16_lossy(&units);
+    }
     match std::str::from_utf8(bytes) {
         Ok(text) => text.trim_start_matches('\u{feff}').to_owned(),
         Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
@@ -101,6 +111,22 @@ struct Broken {
 }
 
 impl Reader {
+    /// The members of a container that may hold machine data.
+    fn archive(&mut self, name: &str, bytes: &[u8]) -> Result<(), Diagnostic> {
+        for member in members(name, bytes)?.iter().filter(|member| of_interest(member.name)) {
+            self.member(&format!("{name}/{}", member.name), member.name, member.bytes);
+        }
+        Ok(())
+    }
+
+    fn member(&mut self, shown: &str, name: &str, bytes: &[u8]) {
+        if is_text(bytes) {
+            self.text(shown, &decoded(bytes));
+        } else {
+            self.listing.binary.push(name.to_owned());
+        }
+    }
+
     fn text(&mut self, name: &str, text: &str) {
         self.channel = 1;
         self.in_program = false;
@@ -140,6 +166,13 @@ impl Reader {
         if line.is_empty() || line.starts_with(';') || self.in_program {
             return Ok(());
         }
+        let line = match without_sum(line) {
+            Some(rest) => {
+                self.listing.summed_lines += 1;
+                rest
+            }
+            None => line,
+        };
         if line.eq_ignore_ascii_case("METRIC") {
             self.listing.metric = true;
             return Ok(());
@@ -300,6 +333,10 @@ impl Reader {
 fn address(inside: &str, scope: Scope) -> Result<(String, u32), Broken> {
     let (mut axis, mut index, mut numbers) = (String::new(), 0_u32, Vec::new());
     for part in inside.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        if !axis.is_empty() && !part.starts_with(|c: char| c.is_ascii_digit()) {
+            // `[u1,AX1]` is how a panel asks for data: what counts from 0 here counts from 1 there.
+            return Err(Broken { expected: "expected one axis, such as [0,AX1]" });
+        }
         if part.starts_with(|c: char| c.is_ascii_digit()) {
             let given: u32 = part.parse().map_err(|_| Broken { expected: "expected an index" })?;
             index = index.saturating_mul(1000).saturating_add(given);
@@ -320,6 +357,13 @@ fn address(inside: &str, scope: Scope) -> Result<(String, u32), Broken> {
         return Err(Broken { expected: "expected an axis, such as [0,AX1]" });
     }
     Ok((axis, index))
+}
+
+/// The line before its sum, ` '38c0`: MD11230 (bit 0, as delivered) writes one behind every line. How it is reckoned is not published.
+fn without_sum(line: &str) -> Option<&str> {
+    let (rest, sum) = line.rsplit_once('\'')?;
+    let is_sum = (1..=4).contains(&sum.len()) && sum.bytes().all(|byte| byte.is_ascii_hexdigit());
+    (is_sum && rest.ends_with([' ', '\t'])).then(|| rest.trim_end())
 }
 
 /// `6`, `1EX-5`, `'H2f'`, `'B101'`, `"X1"`, up to a comment.
