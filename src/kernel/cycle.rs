@@ -305,13 +305,16 @@ impl<S: PieceSource> Kernel<S> {
                 let (inputs, signals) = (step.inputs.as_slice(), step.signals.as_mut_slice());
                 drives.step_some(|place| inputs.get(place).copied().flatten(), |place, now| signals[place] = *now);
             }
+            // All axes have stepped: behind an alarm of one the others have their rows, too, and brake from what they were told.
+            let mut alarm = None;
             for axis in self.machine.axis_ids() {
                 if self.step.inputs[axis].is_none() {
                     continue;
                 }
                 let (setpoint_sent, signals) = (self.step.sent[axis], self.step.signals[axis]);
                 if !self.drives.is_finite(axis.index()) {
-                    return Err(diverged(&self.machine, axis, tick));
+                    alarm = alarm.or_else(|| Some(diverged(&self.machine, axis, tick)));
+                    continue;
                 }
                 self.figures.drive(axis, &signals);
                 let row = AxisRow { tick, axis, setpoint: setpoint_sent, signals };
@@ -320,10 +323,12 @@ impl<S: PieceSource> Kernel<S> {
                     self.in_position.hear(tick, axis, wait, &signals);
                 }
                 let line = setpoint.path.block.line;
-                let alarm = monitored(&self.machine, Some(line), &row);
-                if let Some(alarm) = alarm.or_else(|| self.clamping.watch(&self.machine, line, &row)) {
-                    return Err(alarm);
-                }
+                alarm = alarm
+                    .or_else(|| monitored(&self.machine, Some(line), &row))
+                    .or_else(|| self.clamping.watch(&self.machine, line, &row));
+            }
+            if let Some(alarm) = alarm {
+                return Err(alarm);
             }
         }
         Ok(())

@@ -61,6 +61,43 @@ fn absurd_feedforward_ends_with_an_alarm_and_a_whole_recording() {
     }
 }
 
+/// The alarm of X: Y and Z have their rows in that cycle, too, and their speed set-points go down on the same ramp from what they were.
+#[test]
+fn every_axis_brakes_on_its_ramp() {
+    let loaded = machine("spinner_mvc850", &["axes.X.drive.contour_monitoring_um=10"]);
+    let path = scratch("every_axis_brakes.mcap");
+    let outcome = record("G17 G90 G64 F9000\nG0 X0 Y0 Z0\nG1 X100 Y100\nG1 X0 Y200\nM30\n", &loaded, 1, &path);
+    let alarm = outcome.alarm.expect("an alarm");
+    // The line of the message is that of the place, and so of the JSON.
+    assert!(
+        alarm.message.contains("axis X") && alarm.message.contains(&format!("line {}:", alarm.line())),
+        "{alarm:?}"
+    );
+    let (_, alarm_s) = spindle(&path);
+    let alarm_s = alarm_s.expect("an event");
+    let recording = Recording::open(&path).unwrap();
+    for axis in ["/axis/X", "/axis/Y", "/axis/Z"] {
+        let topic = recording.topics().iter().position(|topic| topic.name == axis).unwrap();
+        let rows: Vec<(f64, f64)> = recording
+            .messages()
+            .unwrap()
+            .map(Result::unwrap)
+            .filter(|message| message.topic == topic)
+            .map(|message| {
+                let Content::Axis(sample) = message.content else { panic!("an axis") };
+                (message.time_ns as f64 * 1e-9, sample.get(axis_field("velocity_command").unwrap()).unwrap())
+            })
+            .collect();
+        assert!(rows.windows(2).all(|pair| (pair[1].0 - pair[0].0 - 1e-3).abs() < 1e-9), "{axis}: a row is missing");
+        let from = rows.iter().find(|row| (row.0 - alarm_s).abs() < 1e-9).expect("a row with the alarm").1;
+        assert!(from.abs() > 1.0 || axis == "/axis/Z", "{axis}: {from}");
+        for (time_s, command) in rows.iter().filter(|row| row.0 > alarm_s + 1e-9) {
+            let wanted = from * (1.0 - (time_s - alarm_s) / 0.05).max(0.0);
+            assert!((command - wanted).abs() < 1e-9 * from.abs().max(1.0), "{axis}, {time_s}: {command} {wanted}");
+        }
+    }
+}
+
 /// After the alarm of an axis the spindle goes to rest with its own acceleration, and its angle with it.
 #[test]
 fn the_spindle_brakes_after_an_alarm() {
