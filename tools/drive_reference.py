@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Independent reference for src/drive: models/drive.md sections 3 to 6 on scipy's solve_ivp.
 
-Goes in: the cases below. Comes out: tests/drive/reference.csv, a few rows per case, compared by tests/drive/main.rs.
+Goes in: the cases below. Comes out: tests/drive/reference.csv, a few rows per case, and tests/drive/two_mass_sets.csv, axes with a second
+mass drawn at random, each with its parameters; compared by tests/drive/reference.rs.
 The plant is integrated numerically (DOP853, relative tolerance 1e-12) with terminal events for stop and breakaway; nothing is
 shared with the Rust code, which solves each piece in closed form. Written from the model text alone.
 
@@ -12,6 +13,7 @@ shared with the Rust code, which solves each piece in closed form. Written from 
 import csv
 import math
 import pathlib
+import random
 from dataclasses import dataclass, replace
 
 from scipy.integrate import solve_ivp
@@ -188,7 +190,7 @@ class Delay:
 
 
 def amplitude(p, a):
-    """MD32510: the pulse over the acceleration at the reversal, piece by piece."""
+    """MD32510: the pulse over the acceleration at the reversal, piece by piece (SINUMERIK 840D sl, 828D, function manual K3, 03/2013, 4.6.4.1)."""
     if not p.adapt:
         return p.pulse
     low, a1, a2, a3 = p.adapt
@@ -197,7 +199,7 @@ def amplitude(p, a):
     if a <= a2:
         return p.pulse
     if a < a3:
-        return max(low, p.pulse * (a3 - a) / (a3 - a2))
+        return p.pulse + (low - p.pulse) / (a3 - a2) * (a - a2)
     return low
 
 
@@ -321,16 +323,60 @@ def cases():
            [2e-6 * k * k * math.sin(math.tau * 6 * k * 1e-3) for k in range(801)], none, True, 8)
 
 
+SET_KEYS = ("J", "Jl", "c", "d", "B", "Tc", "Ts", "g0", "kvff", "at_motor", "Kp", "Tn")
+SETS = 4
+
+
+def drawn(generator):
+    """An axis with a second mass: resonance 30 Hz to 1 kHz, damping of it 0.01 to 0.3, speed loop well below the resonance of a stiff axis."""
+    def log(low, high):
+        return low * (high / low) ** generator.random()
+    J = log(.004, .02)
+    Jl = J * generator.uniform(.2, .8)
+    reduced = Jl * (J - Jl) / J
+    w = math.tau * log(30, 1000)
+    Tc = log(.1, 2)
+    return replace(MVC_X, J=J, Jl=Jl, c=reduced * w * w, d=2 * log(.01, .3) * reduced * w, B=log(.001, .05), Tc=Tc,
+                   Ts=Tc * generator.choice((1, 1, 1.6)), g0=generator.choice((0, generator.uniform(-1, 1))),
+                   kvff=generator.choice((0, 1)), at_motor=generator.random() < .5, Kp=50 * J, Tn=log(.01, .04))
+
+
+def sets():
+    """Drives that do not swing themselves up: an unstable one makes any two solutions part."""
+    generator, count = random.Random(20261126), 0
+    while count < SETS:
+        drive = drawn(generator)
+        rows = simulate(drive, [.4 * math.sin(math.tau * 9 * k * 1e-3) for k in range(81)], lambda k: .5 if 40 <= k < 55 else 0.0)
+        if max(abs(row[0]) for row in rows) < .8:
+            yield f"set{count}", drive, rows
+            count += 1
+
+
+def cells(row):
+    return [*(f"{float(value):.13g}" for value in row[:-1]), row[-1]]
+
+
 def main():
-    target = pathlib.Path(__file__).parent.parent / "tests" / "drive" / "reference.csv"
-    with target.open("w", newline="") as file:
+    tests = pathlib.Path(__file__).parent.parent / "tests" / "drive"
+    columns = ["case", "k", "x_lu", "x_meas_lu", "e_fol_lu", "w_rad_s", "i_a", "i_avg_a", "u_v", "t_ref_n_m", "t_fric_n_m", "flags"]
+    with (tests / "two_mass_sets.csv").open("w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
-        out.writerow(["case", "k", "x_lu", "x_meas_lu", "e_fol_lu", "w_rad_s", "i_a", "i_avg_a", "u_v", "t_ref_n_m", "t_fric_n_m", "flags"])
+        out.writerow(["parameters", "case", *SET_KEYS])
+        out.writerow(columns)
+        for name, drive, rows in sets():
+            out.writerow(["parameters", name, *(repr(float(getattr(drive, key))) for key in SET_KEYS)])
+            for k, row in enumerate(rows):
+                if k % 2 == 0:
+                    out.writerow([name, k, *cells(row)])
+            print(name, "done", flush=True)
+    with (tests / "reference.csv").open("w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(columns)
         for name, drive, x_set, load, held, keep in cases():
             for k, row in enumerate(simulate(drive, x_set, load, held)):
                 if k % keep == 0:
-                    out.writerow([name, k, *(f"{float(value):.13g}" for value in row[:-1]), row[-1]])
-            print(name, "done")
+                    out.writerow([name, k, *cells(row)])
+            print(name, "done", flush=True)
 
 
 if __name__ == "__main__":

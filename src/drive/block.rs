@@ -177,7 +177,9 @@ impl<const N: usize> Block<N> {
         }
         let Columns { state, memory, .. } = &mut self.columns;
         let ticks = f64::from(self.cycles.ticks());
-        memory.current_mean_a = from_fn(|lane| state.current_sum_a[lane] / ticks);
+        for (mean_a, sum_a) in memory.current_mean_a.iter_mut().zip(&state.current_sum_a) {
+            *mean_a = sum_a / ticks;
+        }
     }
 
     /// The current cycles of one axis with the whole plant.

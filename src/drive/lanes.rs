@@ -12,7 +12,6 @@ use super::plain::{Cycles, Memory};
 use super::plant::{Plant, PlantState};
 use super::speed_loop::SpeedLaw;
 use super::transition::{Slopes, Transition};
-use std::array::from_fn;
 
 /// One number of each axis.
 pub(super) type Lanes<const N: usize> = [f64; N];
@@ -313,21 +312,21 @@ struct Seen<const N: usize> {
 }
 
 impl<const N: usize> Seen<N> {
+    #[allow(clippy::needless_range_loop, reason = "several arrays side by side, one lane each")]
     #[inline(always)]
     fn new(laws: &Laws<N>, wires: &OuterWires<N>, state: &State<N>) -> Self {
         let watch = &laws.watch;
-        // At rest the friction is 0, and not added: 0 would take the sign of -0 away.
-        let against_n_m = from_fn(|lane| {
-            let friction_n_m = watch.coulomb_friction_n_m[lane].copysign(state.speed_rad_s[lane]);
-            let moving_n_m = friction_n_m + wires.gravity_n_m[lane];
-            if watch.rest_share[lane] > 0.0 { wires.gravity_n_m[lane] } else { moving_n_m }
-        });
-        Self {
-            side: from_fn(|lane| 1f64.copysign(state.speed_rad_s[lane])),
-            against_n_m,
-            torque_max_n_m: [0.0; N],
-            slowest_rad_s: from_fn(|lane| state.speed_rad_s[lane].abs()),
+        let none = [0.0; N];
+        let mut seen = Self { side: none, against_n_m: none, torque_max_n_m: none, slowest_rad_s: none };
+        for lane in 0..N {
+            let (w, gravity_n_m) = (state.speed_rad_s[lane], wires.gravity_n_m[lane]);
+            // At rest the friction is 0, and not added: 0 would take the sign of -0 away.
+            let moving_n_m = watch.coulomb_friction_n_m[lane].copysign(w) + gravity_n_m;
+            seen.against_n_m[lane] = if watch.rest_share[lane] > 0.0 { gravity_n_m } else { moving_n_m };
+            seen.side[lane] = 1f64.copysign(w);
+            seen.slowest_rad_s[lane] = w.abs();
         }
+        seen
     }
 
     /// 1 for an axis that may not have gone on as it was.

@@ -7,9 +7,9 @@
 //! Assumes that a tick is shorter than half a period of the electro-mechanical oscillation sqrt(Kt Ke / (L J)), which is some
 //! hundred ticks in any real drive: then the acceleration changes its sign at most once in a tick and no stop is overlooked.
 
-use super::integral::falling_zero;
+use super::integral::{Course, falling_zero};
 use super::limit::limited;
-use super::transition::{Excess, Slopes, Transition};
+use super::transition::{Excess, Slopes, Transition, law};
 use crate::machine::{DriveData, MechanicsData, MotorData};
 
 /// More stops and breakaways than one tick can hold. They cannot follow each other closely, because u is constant in a tick and
@@ -173,6 +173,7 @@ impl Plant {
         }
         let kt = self.motor.torque_constant_n_m_per_a;
         let MechanicsData { coulomb_friction_n_m: tc, breakaway_friction_n_m: ts, .. } = self.mechanics;
+        let (a, norm_per_s) = law(&self.motor, &self.mechanics);
         let mut remaining_s = duration_s;
         let mut broke_away: Option<f64> = None;
         for _ in 0..PIECES_MAX {
@@ -194,11 +195,13 @@ impl Plant {
                 // At breakaway Kt i - Tg = ±Ts by definition; where Ts = Tc the motion must start with exactly no acceleration.
                 excess.torque_n_m = (ts - tc).copysign(side);
             }
-            let moving = Moving { plant: self, start: state, excess, voltage_v, side: 1f64.copysign(side) };
+            let rates = [excess.voltage_v / self.motor.inductance_h, excess.torque_n_m / self.mechanics.inertia_kg_m2];
+            let course = Course::new(&a, norm_per_s, rates, remaining_s);
+            let moving = Moving { start_rad_s: state.speed_rad_s, side: 1f64.copysign(side), course };
             let stop_s = moving.time_to_stop(remaining_s);
             let run_s = stop_s.unwrap_or(remaining_s);
             show(Piece { start: state, duration_s: run_s, dry_friction_n_m: Some(friction_n_m) });
-            state = moving.after(run_s);
+            state = Transition::over(&self.motor, &self.mechanics, run_s).apply(state, excess);
             if stop_s.is_none() {
                 return state;
             }
@@ -273,79 +276,50 @@ fn rest_gain_a_per_v(motor: &MotorData, duration_s: f64) -> f64 {
     -(-r * duration_s / l).exp_m1() / r
 }
 
-/// Motion in one direction with constant dry friction, from `start`.
+/// Motion in one direction with constant dry friction.
 struct Moving<'a> {
-    plant: &'a Plant,
-    start: PlantState,
-    excess: Excess,
-    voltage_v: f64,
+    start_rad_s: f64,
     /// +1 or -1: sense of the motion.
     side: f64,
+    /// Of (i, w).
+    course: Course<'a, 2>,
 }
 
 impl Moving<'_> {
-    /// The state after `time_s`.
-    fn after(&self, time_s: f64) -> PlantState {
-        Transition::over(&self.plant.motor, &self.plant.mechanics, time_s).apply(self.start, self.excess)
-    }
-
-    /// Excess in a state of this motion: the slopes change linearly with the state.
-    fn excess_in(&self, state: PlantState) -> Excess {
-        let (motor, mechanics) = (&self.plant.motor, &self.plant.mechanics);
-        let change_a = state.current_a - self.start.current_a;
-        let change_rad_s = state.speed_rad_s - self.start.speed_rad_s;
-        Excess {
-            voltage_v: self.voltage_v
-                - motor.resistance_ohm * state.current_a
-                - motor.back_emf_v_s_per_rad * state.speed_rad_s,
-            torque_n_m: self.excess.torque_n_m + motor.torque_constant_n_m_per_a * change_a
-                - mechanics.viscous_friction_n_m_s_per_rad * change_rad_s,
-        }
+    /// Speed in the sense of the motion, with its first two derivatives.
+    fn speed(&self, time_s: f64) -> [f64; 3] {
+        let at = self.course.at(time_s);
+        [(self.start_rad_s + at.change[1]) * self.side, at.rates[1] * self.side, at.bends[1] * self.side]
     }
 
     /// First instant in (0, `limit_s`] at which the speed comes down to 0.
     fn time_to_stop(&self, limit_s: f64) -> Option<f64> {
-        let end = self.after(limit_s);
-        let end_torque_n_m = self.excess_in(end).torque_n_m * self.side;
-        let start_torque_n_m = self.excess.torque_n_m * self.side;
-        let from_rest = self.start.speed_rad_s == 0.0;
-        if end.speed_rad_s * self.side > 0.0 {
+        let ([end_rad_s, end_rate, _], [_, start_rate, _]) = (self.speed(limit_s), self.speed(0.0));
+        let zero = |low_s, high_s| {
+            falling_zero(low_s, high_s, |time_s| {
+                let [value, slope, _] = self.speed(time_s);
+                (value, slope)
+            })
+        };
+        // The instant at which the acceleration changes its sign.
+        let turning = |sense: f64| {
+            falling_zero(0.0, limit_s, |time_s| {
+                let [_, value, slope] = self.speed(time_s);
+                (value * sense, slope * sense)
+            })
+        };
+        if end_rad_s > 0.0 {
             // A minimum in between may lie below 0.
-            if !(start_torque_n_m < 0.0 && end_torque_n_m > 0.0) {
+            if !(start_rate < 0.0 && end_rate > 0.0) {
                 return None;
             }
-            let lowest_s = self.turning_time(limit_s);
-            let reaches_zero = self.after(lowest_s).speed_rad_s * self.side <= 0.0;
-            return reaches_zero.then(|| self.zero_speed_time(0.0, lowest_s));
+            let lowest_s = turning(-1.0);
+            return (self.speed(lowest_s)[0] <= 0.0).then(|| zero(0.0, lowest_s));
         }
-        if !from_rest {
-            return Some(self.zero_speed_time(0.0, limit_s));
+        if self.start_rad_s != 0.0 {
+            return Some(zero(0.0, limit_s));
         }
         // From rest there is a zero at the start, too: look behind the highest speed. Without one the motion has not begun.
-        (start_torque_n_m >= 0.0 && end_torque_n_m < 0.0)
-            .then(|| self.zero_speed_time(self.turning_time(limit_s), limit_s))
-    }
-
-    /// The instant within `limit_s` at which the acceleration changes its sign.
-    fn turning_time(&self, limit_s: f64) -> f64 {
-        let motor = &self.plant.motor;
-        let mechanics = &self.plant.mechanics;
-        let sense = if self.excess.torque_n_m * self.side < 0.0 { -1.0 } else { 1.0 } * self.side;
-        falling_zero(0.0, limit_s, |time_s| {
-            let state = self.after(time_s);
-            let Excess { voltage_v, torque_n_m } = self.excess_in(state);
-            let torque_rate_n_m_per_s = motor.torque_constant_n_m_per_a * voltage_v / motor.inductance_h
-                - mechanics.viscous_friction_n_m_s_per_rad * torque_n_m / mechanics.inertia_kg_m2;
-            (torque_n_m * sense, torque_rate_n_m_per_s * sense)
-        })
-    }
-
-    /// The instant between `low_s` and `high_s` at which the speed is 0.
-    fn zero_speed_time(&self, low_s: f64, high_s: f64) -> f64 {
-        falling_zero(low_s, high_s, |time_s| {
-            let state = self.after(time_s);
-            let slope_rad_s2 = self.excess_in(state).torque_n_m / self.plant.mechanics.inertia_kg_m2;
-            (state.speed_rad_s * self.side, slope_rad_s2 * self.side)
-        })
+        (start_rate >= 0.0 && end_rate < 0.0).then(|| zero(turning(1.0), limit_s))
     }
 }

@@ -5,7 +5,7 @@
 //! With MD32510 the amplitude depends on the acceleration a of the set-point at the reversal:
 //!
 //! ```text
-//! a < a1: max a / a1      a1 .. a2: max      a2 .. a3: max (1 - (a - a2) / (a3 - a2)), at least min      a > a3: min
+//! a < a1: max a / a1      a1 .. a2: max      a2 .. a3: max + (min - max)(a - a2) / (a3 - a2)      a >= a3: min
 //! ```
 
 use crate::machine::{DriveOptions, FrictionAdaptation};
@@ -66,7 +66,7 @@ impl Reversal {
         } else if a <= a2 {
             most
         } else if a < a3 {
-            (most * (1.0 - (a - a2) / (a3 - a2))).max(lowest_lu_s)
+            most + (lowest_lu_s - most) * ((a - a2) / (a3 - a2))
         } else {
             lowest_lu_s
         }

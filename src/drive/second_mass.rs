@@ -16,7 +16,7 @@
 //! stretches that are short against the resonance, so that speed and spring torque turn at most once in each. Does not know shafts
 //! with more masses.
 
-use super::integral::{Matrix, falling_zero, integrals};
+use super::integral::{Course, Instant, Matrix, falling_zero, integrals};
 use super::plant::PlantState;
 use crate::machine::{DriveData, MechanicsData, MotorData};
 
@@ -117,11 +117,6 @@ impl Map {
             load_angle_rad: state.load_angle_rad + (self.duration_s * z[LOAD] + sum(&self.angle)),
         }
     }
-
-    /// A times a rate: how fast each rate changes.
-    fn change(&self, rates: &Vector) -> Vector {
-        std::array::from_fn(|row| (0..4).map(|k| self.slope[row][k] * rates[k]).sum())
-    }
 }
 
 impl TwoMass {
@@ -190,7 +185,7 @@ impl TwoMass {
             [0.0, 1.0, 0.0, if resting { 0.0 } else { -1.0 }],
             load,
         ];
-        let (rate, angle) = integrals(slope, self.norm_per_s, LOAD, duration_s);
+        let (rate, angle) = integrals(&slope, self.norm_per_s, LOAD, duration_s);
         Map { duration_s, slope, rate, angle }
     }
 
@@ -276,7 +271,11 @@ impl TwoMass {
             return next;
         }
         let after = self.rates(&next, voltage_v, Some(against_n_m));
-        let may_dip = rates[LOAD] * wl < 0.0 && after[LOAD] * wl > 0.0;
+        // The slope of the speed turns at most once in a stretch, so that it is nowhere in a dip steeper than at the ends.
+        let lowest_rad_s = wl.abs().min(next.load_speed_rad_s.abs());
+        let may_dip = rates[LOAD] * wl < 0.0
+            && after[LOAD] * wl > 0.0
+            && lowest_rad_s <= self.stretch_s * rates[LOAD].abs().max(after[LOAD].abs());
         if next.load_speed_rad_s * wl > 0.0 && !may_dip {
             return next;
         }
@@ -313,8 +312,7 @@ impl TwoMass {
         let mut broke_away: Option<f64> = None;
         for _ in 0..PIECES_MAX {
             if broke_away.is_none() && self.sticks(&state, gravity_n_m) {
-                let part =
-                    Part { plant: self, start: state, rates: self.rates(&state, voltage_v, None), resting: true };
+                let part = self.part(state, self.rates(&state, voltage_v, None), true, remaining_s);
                 let leaves = part.time_to_leave(gravity_n_m, ts, remaining_s);
                 let held_s = leaves.map_or(remaining_s, |(time_s, _)| time_s);
                 show(TwoMassPiece { start: state, duration_s: held_s, dry_friction_n_m: None });
@@ -333,7 +331,7 @@ impl TwoMass {
                 // At breakaway s - Tg = ±Ts by definition: where Ts = Tc the motion starts with exactly no acceleration.
                 rates[LOAD] = (ts - tc).copysign(side) / self.mechanics.load_inertia_kg_m2;
             }
-            let part = Part { plant: self, start: state, rates, resting: false };
+            let part = self.part(state, rates, false, remaining_s);
             let stop_s = if self.has_dry_friction { part.time_to_stop(1f64.copysign(side), remaining_s) } else { None };
             let run_s = stop_s.unwrap_or(remaining_s);
             show(TwoMassPiece { start: state, duration_s: run_s, dry_friction_n_m: Some(friction_n_m) });
@@ -344,7 +342,14 @@ impl TwoMass {
             state.load_speed_rad_s = 0.0;
             remaining_s -= run_s;
         }
-        Part { plant: self, start: state, rates: self.rates(&state, voltage_v, None), resting: true }.after(remaining_s)
+        self.part(state, self.rates(&state, voltage_v, None), true, remaining_s).after(remaining_s)
+    }
+
+    /// One law from `start` on, for up to `limit_s`.
+    fn part(&self, start: TwoMassState, rates: Vector, resting: bool, limit_s: f64) -> Part<'_> {
+        let map = if resting { &self.resting } else { &self.moving };
+        let course = Course::new(&map.slope, self.norm_per_s, rates, limit_s);
+        Part { plant: self, start, rates, resting, course }
     }
 }
 
@@ -354,6 +359,8 @@ struct Part<'a> {
     start: TwoMassState,
     rates: Vector,
     resting: bool,
+    /// Of z.
+    course: Course<'a, 4>,
 }
 
 impl Part<'_> {
@@ -361,14 +368,17 @@ impl Part<'_> {
         self.plant.map(time_s, self.resting).apply(&self.start, &self.rates)
     }
 
-    /// State, rates and their change after `time_s`: the rates change linearly with the state.
+    /// State, rates and their change after `time_s`; the load's angle plays no part.
     fn at(&self, time_s: f64) -> (TwoMassState, Vector, Vector) {
-        let map = self.plant.map(time_s, self.resting);
-        let state = map.apply(&self.start, &self.rates);
-        let (now, start) = (state.vector(), self.start.vector());
-        let change = map.change(&std::array::from_fn(|n| now[n] - start[n]));
-        let rates = std::array::from_fn(|n| self.rates[n] + change[n]);
-        (state, rates, map.change(&rates))
+        let Instant { change, rates, bends } = self.course.at(time_s);
+        let state = TwoMassState {
+            current_a: self.start.current_a + change[0],
+            motor_speed_rad_s: self.start.motor_speed_rad_s + change[MOTOR],
+            twist_rad: self.start.twist_rad + change[TWIST],
+            load_speed_rad_s: self.start.load_speed_rad_s + change[LOAD],
+            load_angle_rad: self.start.load_angle_rad,
+        };
+        (state, rates, bends)
     }
 
     /// First instant in (0, `limit_s`] at which the load's speed comes down to 0; `side` is the sense of the motion.

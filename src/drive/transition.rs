@@ -11,7 +11,7 @@
 //! inverse of A, so that Ke = 0 and B = 0 are ordinary cases, and a state in balance (z' = 0) stays where it is to the last bit.
 //! Does not know dry friction: that is the plant's.
 
-use super::integral::integrals;
+use super::integral::{Matrix, integrals};
 use super::plant::PlantState;
 use crate::machine::{MechanicsData, MotorData};
 
@@ -73,17 +73,22 @@ impl Slopes {
     }
 }
 
+/// A, and its size after the diagonal scaling that balances its two off-diagonal entries.
+pub(super) fn law(motor: &MotorData, mechanics: &MechanicsData) -> (Matrix<2>, f64) {
+    let (l, j) = (motor.inductance_h, mechanics.inertia_kg_m2);
+    let a = [
+        [-motor.resistance_ohm / l, -motor.back_emf_v_s_per_rad / l],
+        [motor.torque_constant_n_m_per_a / j, -mechanics.viscous_friction_n_m_s_per_rad / j],
+    ];
+    (a, a[0][0].abs().max(a[1][1].abs()) + (a[0][1] * a[1][0]).abs().sqrt())
+}
+
 impl Transition {
     /// The map over `duration_s`.
     pub(super) fn over(motor: &MotorData, mechanics: &MechanicsData, duration_s: f64) -> Self {
         let (l, j) = (motor.inductance_h, mechanics.inertia_kg_m2);
-        let a = [
-            [-motor.resistance_ohm / l, -motor.back_emf_v_s_per_rad / l],
-            [motor.torque_constant_n_m_per_a / j, -mechanics.viscous_friction_n_m_s_per_rad / j],
-        ];
-        // Size of A after the diagonal scaling that balances its two off-diagonal entries.
-        let norm_per_s = a[0][0].abs().max(a[1][1].abs()) + (a[0][1] * a[1][0]).abs().sqrt();
-        let (f, g) = integrals(a, norm_per_s, 1, duration_s);
+        let (a, norm_per_s) = law(motor, mechanics);
+        let (f, g) = integrals(&a, norm_per_s, 1, duration_s);
         Self {
             duration_s,
             current_by_voltage_a_per_v: f[0][0] / l,

@@ -52,6 +52,8 @@ pub(super) struct AxisRules {
     pub jerk_limited: bool,
     /// OVR and OVRRAP.
     pub override_ratio: f64,
+    /// Neither OVR nor the switch acts: G63.
+    pub override_fixed: bool,
     /// OVRRAP; at most 1, because the axes cannot do more.
     pub rapid_override_ratio: f64,
     /// FGROUP.
@@ -135,6 +137,9 @@ impl AxisRules {
     /// The same with this override on top of OVR; both together do no more than the control allows.
     pub(super) fn overridden(&self, override_ratio: f64) -> Self {
         let mut rules = self.clone();
+        if rules.override_fixed {
+            return rules;
+        }
         rules.override_ratio = (rules.override_ratio * override_ratio).min(OVERRIDE_MAX_RATIO);
         if let Some(drive) = &mut rules.drive {
             drive.slow = drive.slow.overridden(override_ratio);
@@ -174,7 +179,8 @@ impl AxisRules {
             arc_limits,
             setpoint_period_s,
             jerk_limited: true,
-            override_ratio: programmed.override_ratio,
+            override_ratio: if programmed.override_acts { programmed.override_ratio } else { 1.0 },
+            override_fixed: !programmed.override_acts,
             rapid_override_ratio: programmed.rapid_override_ratio.min(1.0),
             group,
             drive: None,

@@ -156,15 +156,26 @@ impl Interpreter {
         Ok(())
     }
 
-    /// G63 is a straight line with F that ends at rest, in its block alone.
+    /// G63 is a straight line with F that ends at rest, in its block alone. The overrides of feed and spindle count as 100 % in it.
     fn move_block(&mut self, block: &mut Collected, events: &mut Vec<Event>) -> Outcome<()> {
         if !block.taps_with_chuck {
             return self.motion(&block.motion, events);
         }
         block.motion.exact_stop = true;
+        let acting_rpm = self.simulated_speed_rpm();
+        let fixed_rpm = self.modal.feed_modes.within_limits_rpm(self.modal.spindle_speed_rpm);
+        let changes = acting_rpm > 0.0 && acting_rpm != fixed_rpm && self.modal.feed_modes.master_is_simulated();
+        if changes {
+            events.push(Event::SpindleSpeed { speed_rpm: fixed_rpm });
+        }
+        let programmed = self.modal.programmed.clone();
+        self.set_programmed(|limits| limits.override_acts = false);
         let modal = std::mem::replace(&mut self.modal.motion, Motion::Line);
         let moved = self.motion(&block.motion, events);
-        self.modal.motion = modal;
+        (self.modal.motion, self.modal.programmed) = (modal, programmed);
+        if changes {
+            self.emit_function(vec![Event::SpindleSpeed { speed_rpm: acting_rpm }], false);
+        }
         moved
     }
 

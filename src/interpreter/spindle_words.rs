@@ -159,7 +159,7 @@ impl Interpreter {
     }
 
     /// What the simulated spindle gets now.
-    fn simulated_speed_rpm(&self) -> f64 {
+    pub(super) fn simulated_speed_rpm(&self) -> f64 {
         let modes = &self.modal.feed_modes;
         if !modes.master_is_simulated() {
             return modes.other_spindles.get(&SIMULATED_SPINDLE).map_or(0.0, |state| self.simulated_rpm(state.0));

@@ -289,6 +289,8 @@ pub struct ProgrammedLimits {
     pub synchronous_max_lu_s: PerAxis<Option<f64>>,
     /// OVR: share of the programmed feed.
     pub override_ratio: f64,
+    /// Overrides of the feed act: not on G63.
+    pub override_acts: bool,
     /// OVRRAP: share of the rapid velocity; more than 1 is 1.
     pub rapid_override_ratio: f64,
     /// OTOL: tolerance of rotary axes.
@@ -311,6 +313,7 @@ impl Default for ProgrammedLimits {
             jerk_ratio: PerAxis::splat(1.0),
             synchronous_max_lu_s: PerAxis::splat(None),
             override_ratio: 1.0,
+            override_acts: true,
             rapid_override_ratio: 1.0,
             orientation_tolerance_rad: None,
             axis_tolerance_lu: PerAxis::splat(None),

@@ -15,7 +15,9 @@ use crate::base::clock::gcd;
 use crate::base::{AxisId, Diagnostic, MachinePoint, PerAxis, Tick};
 use crate::drive::{AxisSignals, Drive, DriveBatch, DriveInput, IdealDrive, SpindleLag, SpindleSignals, Start};
 use crate::feed::{Limit, LimitKind};
-use crate::interpolator::{AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint};
+use crate::interpolator::{
+    AxisSetpoint, Begun, ExactStopWait, FineInterpolator, Interpolator, Setpoint, SpindleSetpoint,
+};
 use crate::interpreter::{ExactStop, Setup};
 use crate::kinematics::{Kinematics, ToolPose};
 use crate::machine::{Axis, Machine};
@@ -303,13 +305,16 @@ impl<S: PieceSource> Kernel<S> {
                 let (inputs, signals) = (step.inputs.as_slice(), step.signals.as_mut_slice());
                 drives.step_some(|place| inputs.get(place).copied().flatten(), |place, now| signals[place] = *now);
             }
+            // All axes have stepped: behind an alarm of one the others have their rows, too, and brake from what they were told.
+            let mut alarm = None;
             for axis in self.machine.axis_ids() {
                 if self.step.inputs[axis].is_none() {
                     continue;
                 }
                 let (setpoint_sent, signals) = (self.step.sent[axis], self.step.signals[axis]);
                 if !self.drives.is_finite(axis.index()) {
-                    return Err(diverged(&self.machine, axis, tick));
+                    alarm = alarm.or_else(|| Some(diverged(&self.machine, axis, tick)));
+                    continue;
                 }
                 self.figures.drive(axis, &signals);
                 let row = AxisRow { tick, axis, setpoint: setpoint_sent, signals };
@@ -318,10 +323,12 @@ impl<S: PieceSource> Kernel<S> {
                     self.in_position.hear(tick, axis, wait, &signals);
                 }
                 let line = setpoint.path.block.line;
-                let alarm = monitored(&self.machine, Some(line), &row);
-                if let Some(alarm) = alarm.or_else(|| self.clamping.watch(&self.machine, line, &row)) {
-                    return Err(alarm);
-                }
+                alarm = alarm
+                    .or_else(|| monitored(&self.machine, Some(line), &row))
+                    .or_else(|| self.clamping.watch(&self.machine, line, &row));
+            }
+            if let Some(alarm) = alarm {
+                return Err(alarm);
             }
         }
         Ok(())
@@ -371,6 +378,11 @@ impl<S: PieceSource> Kernel<S> {
         if self.drives.has_cascade() {
             self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
         }
+    }
+
+    /// The spindle one t_s later.
+    pub(super) fn step_spindle(&mut self, setpoint: &SpindleSetpoint) {
+        self.output.spindle = self.spindle.step(setpoint);
     }
 
     /// The drives, for [`braking`](super::braking).

@@ -65,8 +65,17 @@ pub(super) fn record_follow(
     recorder.check()
 }
 
-/// Records how the axes brake after an alarm.
-pub(super) fn record_braking(recorder: &mut Recorder, output: &CycleOutput) -> Result<(), Diagnostic> {
+/// Records how the axes brake after an alarm, and the spindle at a set-point tick.
+pub(super) fn record_braking(
+    recorder: &mut Recorder,
+    machine: &Machine,
+    output: &CycleOutput,
+) -> Result<(), Diagnostic> {
+    let tick = output.rows.first().map(|row| row.tick);
+    let period = machine.cycle.time_base.ticks_per_setpoint();
+    if let Some(tick) = tick.filter(|tick| machine.spindle.is_some() && tick.0.is_multiple_of(period)) {
+        recorder.spindle(tick, &output.spindle);
+    }
     record_rows(recorder, &output.rows);
     recorder.check()
 }

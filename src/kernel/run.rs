@@ -8,11 +8,12 @@ use super::preparation::{PieceSource, Preparation};
 use super::record::{record_alarm, record_braking, record_cycle};
 use super::summary::{RunSummary, drive_warnings};
 use super::threads::PreparationThread;
+use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, Tick};
 use crate::feed::OverrideSchedule;
 use crate::interpreter::Setup;
 use crate::machine::{Loaded, Machine, TimeLawKind, unsupported};
-use crate::program::ProgramId;
+use crate::program::{BlockRef, ProgramId, ProgramSource};
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
 use std::sync::Arc;
@@ -125,7 +126,10 @@ fn drive_loop<S: PieceSource>(
             Ok(Status::Running) => {}
             Ok(Status::Finished) => break,
             // What the cycle gave up to the alarm is recorded all the same.
-            Err(alarm) => drive_alarm = Some(alarm),
+            Err(alarm) => {
+                let block = kernel.output().setpoint.map(|setpoint| setpoint.path.block);
+                drive_alarm = Some(placed(alarm, &options.setup.program, block));
+            }
         }
         if let Some(pacer) = &mut pacer {
             pacer.wait();
@@ -148,6 +152,14 @@ fn drive_loop<S: PieceSource>(
     conclude(kernel, &options, drive_alarm, recorder, pacer.map(|pacer| pacer.deadlines))
 }
 
+/// The alarm of a drive at the line of the main program in which it came; in a sub-program its message alone tells the line.
+fn placed(alarm: Diagnostic, program: &ProgramSource, block: Option<BlockRef>) -> Diagnostic {
+    let Some(block) = block.filter(|block| block.program == ProgramId(0)) else { return alarm };
+    let Some(line_text) = program.text_of_line(block.line) else { return alarm };
+    let columns = 0..line_text.trim_end().len();
+    alarm.at(Place { file: program.shared_name(), line: block.line, line_text, columns, label: String::new() })
+}
+
 /// The alarm of a drive, and how the axes brake after it.
 fn record_stop<S: PieceSource>(
     kernel: &mut Kernel<S>,
@@ -159,7 +171,7 @@ fn record_stop<S: PieceSource>(
     let Some(mut braking) = kernel.brake() else { return Ok(()) };
     loop {
         let goes_on = kernel.brake_on(&mut braking);
-        record_braking(recorder, kernel.output()).map_err(RunError)?;
+        record_braking(recorder, kernel.machine(), kernel.output()).map_err(RunError)?;
         if !goes_on {
             return Ok(());
         }

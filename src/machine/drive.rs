@@ -4,7 +4,7 @@
 //! drive is an ideal axis; half a drive is an error. Model: models/drive.md section 2; what is rejected: section 8.
 
 use super::axis::{by_kind, lu};
-use super::checked::{AxisLimits, DriveData, MonitoringData};
+use super::checked::{AxisLimits, DriveData, MechanicsData, MonitoringData};
 use super::clock::LoopCycles;
 use super::drive_options::{options, small_lu};
 use super::mechanics::{Mechanics, by_motor, encoder, mechanics, motor, motor_kind};
@@ -12,9 +12,14 @@ use super::section::Section;
 use crate::base::AxisKind;
 use crate::base::diagnostics::Diagnostic;
 use crate::base::units::{mm_from_um, s_from_ms, s_from_us};
+use std::f64::consts::TAU;
 
 /// The tables that are needed together.
 const TABLES: [&str; 3] = ["drive", "motor", "mechanics"];
+
+/// A resonance of motor and load above this share of the sampling frequency of the current loop is told of: `drive::second_mass` has as many stretches
+/// in a tick as follow its swings up to there.
+const RESONANCE_SHARE_MAX: f64 = 4.0;
 
 /// The drive of an axis; `None` for an ideal axis, and after a report of half a drive.
 pub(super) fn drive<'f>(axis: &Section<'f>, limits: &AxisLimits) -> Option<(DriveData, LoopCycles<'f>)> {
@@ -99,12 +104,9 @@ fn controllers<'f>(axis: &Section<'f>) -> (DriveData, LoopCycles<'f>) {
         let message = format!("{} is wider than the coarse window", drive.full(key));
         drive.report_at(key, "", Diagnostic::warning("M0104", message).help("the fine window is the smaller one"));
     }
-    let cycles = LoopCycles {
-        position_cycle_s,
-        speed_cycle_s,
-        current_cycle_s: s_from_us(drive.number("current_cycle_us")),
-        drive,
-    };
+    let current_cycle_s = s_from_us(drive.number("current_cycle_us"));
+    check_resonance(axis, &data.mechanics, current_cycle_s);
+    let cycles = LoopCycles { position_cycle_s, speed_cycle_s, current_cycle_s, drive };
     (data, cycles)
 }
 
@@ -122,6 +124,25 @@ fn clamp_m_functions(drive: &Section<'_>) -> Option<[u32; 2]> {
     }
     let [Some(clamp), Some(release)] = functions else { return None };
     Some([clamp, release])
+}
+
+/// A resonance that no loop can see: the numbers of such a spring are a slip of the pen, or a rigid axis.
+fn check_resonance(axis: &Section<'_>, mechanics: &MechanicsData, current_cycle_s: f64) {
+    let MechanicsData { inertia_kg_m2, load_inertia_kg_m2, coupling_stiffness_n_m_per_rad, .. } = *mechanics;
+    let per_inertia = 1.0 / load_inertia_kg_m2 + 1.0 / (inertia_kg_m2 - load_inertia_kg_m2);
+    let resonance_hz = (coupling_stiffness_n_m_per_rad * per_inertia).sqrt() / TAU;
+    if load_inertia_kg_m2 > 0.0 && resonance_hz * current_cycle_s > RESONANCE_SHARE_MAX && resonance_hz.is_finite() {
+        let key = by_motor(axis, "coupling_stiffness_n_m_per_rad", "coupling_stiffness_n_per_um");
+        let load = by_motor(axis, "load_inertia_kg_m2", "load_mass_kg");
+        let message = format!(
+            "axes.{}.mechanics.{key}: motor and load swing at {resonance_hz:.0} Hz, and the current loop samples at {:.0} Hz",
+            axis_name(axis),
+            1.0 / current_cycle_s
+        );
+        let help =
+            format!("such an axis is rigid: remove {load}, or give the stiffness of the resonance that was measured");
+        axis.report_at("mechanics", "", Diagnostic::warning("M0105", message).help(help));
+    }
 }
 
 /// A drive that cannot reach the velocity of its axis never follows a rapid: worth a word.

@@ -1,6 +1,7 @@
 //! models/drive.md section 7, numbers 1 to 4, 6 and 8.
 
-use crate::rig::{Rig, input, machines};
+use crate::rig::{Rig, input, machines, mvc_x};
+use sollwert::base::TimeBase;
 use sollwert::drive::flags;
 use std::f64::consts::TAU;
 
@@ -62,6 +63,55 @@ fn form_2_acceleration_lag() {
                 "{name}, d_pos {setpoint_delay_s}, d_ff {feedforward_delay_s}: {error_share:e}"
             );
         }
+    }
+}
+
+/// 7.2 in full where B > 0. The torque that viscous friction asks for grows, the speed loop gives it in steps of T_v, and between two speed ticks the
+/// speed is no straight line: the lag gets (B/J) ∫ (t - T_v/2)(s(t) - t/T_v) dt over a speed cycle, s(t) the share of a step that the current has made by
+/// then. A current loop that settles in one current cycle (R = Ke = 0, Kpi = L/T_i) makes s = min(t/T_i, 1), which leaves
+/// (B T_v²/J) (-1/12 + 1/(4 n_v) - 1/(6 n_v²)). Terms of the order (B T_v/J)² are left out: 1e-6 here.
+#[test]
+fn form_2_with_the_staircase_of_viscous_friction() {
+    for current_ticks in [1_u32, 2, 4, 16] {
+        let mut rig = mvc_x().friction(0.0, 0.0).with(|data| {
+            data.velocity_feedforward_ratio = 1.0;
+            (data.position_cycle_ticks, data.speed_cycle_ticks) = (u64::from(current_ticks), u64::from(current_ticks));
+            data.current_cycle_ticks = 1;
+            (data.motor.resistance_ohm, data.motor.back_emf_v_s_per_rad) = (1e-9, 0.0);
+            data.current_gain_v_per_a = data.motor.inductance_h * f64::from(current_ticks) * 1e3;
+            data.current_reset_time_s = f64::INFINITY;
+            (data.voltage_max_v, data.current_max_a) = (f64::INFINITY, f64::INFINITY);
+        });
+        rig.time_base = TimeBase::new((1_000_000, 1), u64::from(current_ticks));
+        let a = 300.0;
+        let last = rig.follow(1.0, |t_s| 0.5 * a * t_s * t_s).pop().expect("signals");
+        let (data, t, n) = (&rig.data, rig.speed_period_s(), f64::from(current_ticks));
+        let b = data.mechanics.viscous_friction_n_m_s_per_rad;
+        let staircase_s = b * t * t / data.mechanics.inertia_kg_m2 * (-1.0 / 12.0 + 0.25 / n - 1.0 / (6.0 * n * n));
+        let lag_s = t / 2.0 + b * data.speed_reset_time_s / data.speed_gain_n_m_s_per_rad + staircase_s;
+        let off_s = last.control_deviation_lu * data.position_gain_per_s / a - lag_s;
+        assert!(off_s.abs() < 3e-7 * t, "{current_ticks}: {off_s:e} s, of which the staircase is {staircase_s:e}");
+        assert!(current_ticks < 16 || staircase_s < -7e-5 * t, "the term must show");
+    }
+}
+
+/// With the current loops of the machines the term lies between that of a current loop without delay, -B T_v²/(12 J), and nothing.
+#[test]
+fn the_staircase_is_small_and_makes_the_lag_smaller() {
+    for (name, rig) in machines() {
+        let rig = rig.friction(0.0, 0.0).with(|data| {
+            data.velocity_feedforward_ratio = 1.0;
+            data.speed_cycle_ticks = data.position_cycle_ticks;
+            (data.mechanics.gravity_sin_n_m, data.mechanics.gravity_cos_n_m) = (0.0, 0.0);
+        });
+        let a = 0.6 * rig.data.speed_setpoint_max_lu_s;
+        let last = rig.follow(1.0, |t_s| 0.5 * a * t_s * t_s).pop().expect("signals");
+        let (data, t) = (&rig.data, rig.speed_period_s());
+        let b = data.mechanics.viscous_friction_n_m_s_per_rad;
+        let form_s = t / 2.0 + b * data.speed_reset_time_s / data.speed_gain_n_m_s_per_rad;
+        let off_s = last.control_deviation_lu * data.position_gain_per_s / a - form_s;
+        let most_s = b * t * t / (12.0 * data.mechanics.inertia_kg_m2);
+        assert!(off_s < 1e-9 * t && off_s > -1.001 * most_s, "{name}: {off_s:e} of {most_s:e}");
     }
 }
 

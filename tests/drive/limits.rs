@@ -35,6 +35,41 @@ fn saturation_recovers_without_windup() {
     }
 }
 
+/// All three limits in one tick, the torque held by p1520 (at 22 V the motor does not reach the clamped speed): each is told by its own flag, each holds, and the axis arrives without windup.
+#[test]
+fn torque_limit_and_clamps_together() {
+    let rig = mvc_x().with(|data| {
+        (data.speed_setpoint_max_lu_s, data.voltage_max_v) = (100.0, 22.0);
+        (data.options.torque_upper_n_m, data.options.torque_lower_n_m) = (6.0, -30.0);
+    });
+    let signals = rig.follow(1.5, |t_s| if t_s < 0.01 { 0.0 } else { 60.0 });
+    let (speed, torque, voltage) = (flags::SPEED_CLAMP, flags::CURRENT_LIMIT, flags::VOLTAGE_LIMIT);
+    for s in &signals {
+        assert!((-30.0..=6.0).contains(&s.torque_reference_n_m) && s.voltage_v.abs() <= 22.0, "{s:?}");
+        assert!(s.velocity_command_lu_s.abs() <= 100.0, "{s:?}");
+        let at_torque = s.torque_reference_n_m == 6.0 || s.torque_reference_n_m == -30.0;
+        assert_eq!(s.flags & torque != 0, at_torque, "{s:?}");
+        assert_eq!(s.flags & speed != 0, s.velocity_command_lu_s.abs() == 100.0, "{s:?}");
+        assert_eq!(s.flags & voltage != 0, s.voltage_v.abs() == 22.0, "{s:?}");
+    }
+    assert!(signals.iter().any(|s| s.flags & (speed | torque | voltage) == speed | torque | voltage));
+    let furthest_lu = signals.iter().fold(0.0_f64, |most, s| most.max(s.position_actual_lu));
+    assert!(furthest_lu < 60.5, "{furthest_lu}");
+    assert!((signals.last().expect("signals").position_actual_lu - 60.0).abs() < 0.01);
+}
+
+/// A torque limit of ±Kt i on either side is a current limit i: the same bits.
+#[test]
+fn a_torque_limit_is_a_current_limit() {
+    let jump = |t_s: f64| if t_s < 0.01 { 0.0 } else { 20.0 };
+    let by_current = mvc_x().with(|data| data.current_max_a = 4.0);
+    let by_torque = mvc_x().with(|data| {
+        let most_n_m = 4.0 * data.motor.torque_constant_n_m_per_a;
+        (data.options.torque_upper_n_m, data.options.torque_lower_n_m) = (most_n_m, -most_n_m);
+    });
+    assert_eq!(by_current.follow(0.5, jump), by_torque.follow(0.5, jump));
+}
+
 /// Locked against a load above the current limit for a second, the axis is carried off; once the load is gone it comes back
 /// without delay: the integral has waited at the limit.
 #[test]

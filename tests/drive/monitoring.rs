@@ -1,4 +1,4 @@
-//! What the control watches (docs/drive.md section 8): the contour deviation in closed form, windows and times recomputed from the signals.
+//! What the control watches (docs/drive.md section 9): the contour deviation in closed form, windows and times recomputed from the signals.
 
 use crate::rig::{Rig, input, machines, mvc_x};
 use sollwert::drive::{AxisSignals, flags, monitoring};

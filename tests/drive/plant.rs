@@ -128,9 +128,9 @@ fn form_7_balances() {
 fn a_tick_may_be_cut_anywhere() {
     let mut random = Random(11);
     let mut with_events = 0;
+    let rigs = [mvc_x().friction(0.6, 0.9), mvc_y()].map(|rig| (plants(&rig).0, rig));
     for round in 0..20_000 {
-        let rig = if round % 2 == 0 { mvc_x().friction(0.6, 0.9) } else { mvc_y() };
-        let (plant, _) = plants(&rig);
+        let (plant, rig) = &rigs[round % 2];
         let h = rig.current_period_s();
         // Near rest and near the breakaway torque, where the events are.
         let breakaway_a = rig.data.mechanics.breakaway_friction_n_m / rig.data.motor.torque_constant_n_m_per_a;

@@ -13,9 +13,16 @@ use std::f64::consts::TAU;
 const REFERENCE: &str = include_str!("reference.csv");
 const TOLERANCE_SHARE: f64 = 1e-11;
 
+/// As [`REFERENCE`], in front of each set its parameters.
+const TWO_MASS_SETS: &str = include_str!("two_mass_sets.csv");
+
 /// Compares every kept row; flags must be equal.
 fn compare(case: &str, signals: &[AxisSignals]) {
-    let rows: Vec<Vec<f64>> = REFERENCE
+    compare_in(REFERENCE, case, signals);
+}
+
+fn compare_in(reference: &str, case: &str, signals: &[AxisSignals]) {
+    let rows: Vec<Vec<f64>> = reference
         .lines()
         .filter_map(|line| line.strip_prefix(case)?.strip_prefix(','))
         .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
@@ -158,4 +165,35 @@ fn a_screw_with_errors_measured_at_the_motor() {
         data.encoder_compensation = table(3.0, &[2e-3, -2e-3, 3e-3]);
     });
     compare("screw", &rig.run(setpoints(401, |k| -5.0 + 6.0 * (1.0 - (TAU * 2.0 * k * 1e-3).cos()))));
+}
+
+/// Axes drawn at random by the script: resonance 30 Hz to 1 kHz, any share of the load, measured at either end.
+#[test]
+fn second_masses_drawn_at_random() {
+    let sets = TWO_MASS_SETS.lines().filter_map(|line| line.strip_prefix("parameters,set"));
+    let mut count = 0;
+    for line in sets {
+        let (name, numbers) = line.split_once(',').expect("a name and its parameters");
+        let values: Vec<f64> = numbers.split(',').map(|cell| cell.parse().expect("a number")).collect();
+        let [j, jl, c, d, b, tc, ts, g0, kvff, at_motor, kp, tn] = values[..] else {
+            panic!("twelve parameters: {line}")
+        };
+        let rig = rig::mvc_x().friction(tc, ts).with(|data| {
+            data.velocity_feedforward_ratio = kvff;
+            data.speed_gain_n_m_s_per_rad = kp;
+            data.speed_reset_time_s = tn;
+            data.encoder.position_source = if at_motor == 1.0 { PositionSource::Motor } else { PositionSource::Load };
+            let mechanics = &mut data.mechanics;
+            (mechanics.inertia_kg_m2, mechanics.load_inertia_kg_m2) = (j, jl);
+            (mechanics.coupling_stiffness_n_m_per_rad, mechanics.coupling_damping_n_m_s_per_rad) = (c, d);
+            (mechanics.viscous_friction_n_m_s_per_rad, mechanics.gravity_n_m) = (b, g0);
+        });
+        let inputs = (0..81).map(|k| DriveInput {
+            load_n_m: if (40..55).contains(&k) { 0.5 } else { 0.0 },
+            ..input(0.4 * (TAU * 9.0 * f64::from(k) * 1e-3).sin())
+        });
+        compare_in(TWO_MASS_SETS, &format!("set{name}"), &rig.run(inputs));
+        count += 1;
+    }
+    assert_eq!(count, 4);
 }

@@ -252,6 +252,25 @@ fn the_rigid_axis_is_the_limit() {
     }
 }
 
+/// Springs that no loop sees: damped or not, the axis is the rigid one but for a wind-up of nanometres, and a tick costs what it costs elsewhere
+/// (with a search in every stretch these 160,000 ticks would take minutes).
+#[test]
+fn a_spring_that_is_as_good_as_rigid() {
+    let rig = mvc_x();
+    let motion = |t_s: f64| 3.0 * (1.0 - (TAU * 2.0 * t_s).cos());
+    let rigid = rig.follow(1.0, motion);
+    for resonance_hz in [1e5, 1e6, 1e8] {
+        for damping_ratio in [0.0, 0.1, 3.0] {
+            let stiff = rig.clone().with(|data| split(data, resonance_hz, damping_ratio)).follow(1.0, motion);
+            for (k, (a, b)) in stiff.iter().zip(&rigid).enumerate() {
+                // At a reversal a stop may be found a fraction of a tick late: some tens of nanometres.
+                let apart_lu = (a.position_actual_lu - b.position_actual_lu).abs();
+                assert!(apart_lu < 1e-4, "{resonance_hz} Hz, {damping_ratio}, {k}: {apart_lu:e}");
+            }
+        }
+    }
+}
+
 /// Held under gravity it stays still with load and motor; hunting with Ts > Tc rests without chatter.
 #[test]
 fn rest_without_chatter() {

@@ -1,4 +1,5 @@
 //! Tests of the room `kernel`: whole runs, and what each limit costs.
 
+mod drives;
 mod runs;
 mod what_if;

@@ -25,22 +25,22 @@ N120 G0 Z20 M5
 N130 M30
 ";
 
-fn machine(name: &str, sets: &[&str]) -> Loaded {
+pub fn machine(name: &str, sets: &[&str]) -> Loaded {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     load(name, &sets).unwrap_or_else(|error| panic!("{error:?}"))
 }
 
-fn program(text: &str) -> ProgramSource {
+pub fn program(text: &str) -> ProgramSource {
     ProgramSource::from_bytes("part.mpf", text.as_bytes())
 }
 
-fn scratch(name: &str) -> PathBuf {
+pub fn scratch(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kernel");
     std::fs::create_dir_all(&folder).unwrap();
     folder.join(name)
 }
 
-fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutcome {
+pub fn record(text: &str, machine: &Loaded, threads: usize, path: &Path) -> RunOutcome {
     let options = RunOptions {
         machine,
         setup: program(text).into(),

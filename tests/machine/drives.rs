@@ -1,7 +1,7 @@
 //! Rejections of models/drive.md section 8, key by key, and what a drive file may say besides: linear motors, rack, second mass, tables.
 
 use crate::{EXAMPLE, parse, shown, with};
-use sollwert::base::SourceText;
+use sollwert::base::{Diagnostic, SourceText};
 use sollwert::machine::{self, Machine};
 
 /// Greater than 0, and finite.
@@ -168,4 +168,20 @@ fn transmissions_second_mass_and_tables_that_do_not_fit() {
     let machine = loaded(EXAMPLE, &sets.map(str::to_owned)).unwrap_or_else(|found| panic!("{found}"));
     let table = machine.axes[0].drive.as_ref().and_then(|drive| drive.encoder_compensation.as_ref()).expect("a table");
     assert_eq!((table.start_lu, table.step_lu, table.errors_lu.as_slice()), (0.0, 100.0, &[0.0, 0.005, -0.0025][..]));
+}
+
+/// A spring that no loop sees is told of, and its key named; one that a loop may see is not.
+#[test]
+fn a_second_mass_that_is_as_good_as_rigid() {
+    // Half and half: the resonance is 4 times 16 kHz at 3.4e8 N·m/rad.
+    for (stiffness, told) in [("1e12", true), ("4e8", true), ("3e8", false), ("1e4", false)] {
+        let sets = ["load_inertia_kg_m2=0.00425".to_owned(), format!("coupling_stiffness_n_m_per_rad={stiffness}")];
+        let sets = sets.map(|set| format!("axes.X.mechanics.{set}"));
+        let loaded = machine::parse(&SourceText::new("test.toml", EXAMPLE), &sets)
+            .unwrap_or_else(|found| panic!("{}", shown(&found)));
+        let found = loaded.warnings.iter().find(|warning| warning.code == "M0105");
+        assert_eq!(found.is_some(), told, "{stiffness}");
+        let names_key = |found: &Diagnostic| found.message.contains("axes.X.mechanics.coupling_stiffness_n_m_per_rad");
+        assert!(found.is_none_or(names_key), "{found:?}");
+    }
 }

@@ -4,6 +4,7 @@ use sollwert::base::Severity;
 use sollwert::machine::{
     AxisChoice, ImportOptions, Imported, ListingFile, Loaded, Origin, export_listing, import_listing, load, shipped,
 };
+use std::f64::consts::TAU;
 
 pub fn file(name: &str, text: &str) -> ListingFile {
     ListingFile { name: name.to_owned(), bytes: text.as_bytes().to_vec() }
@@ -194,6 +195,27 @@ fn a_listing_by_hand_has_the_values_worked_out_by_hand() {
             && refused.place.as_ref().is_some_and(|place| place.line_text.contains("N20603")),
         "{refused:?}"
     );
+}
+
+/// MD35100 and MD35130 limit the speed; MD35500 = 0, or no tolerance (MD35150 = 0), lets a feed start at once; without MD35500 nothing is known of waits.
+#[test]
+fn a_spindle_has_its_highest_speed_and_its_waits() {
+    let spindle = "N35000 $MA_SPIND_ASSIGN_TO_MACHAX[AX3]=1\n";
+    let with = |data: &str| {
+        let data: String = data.split(' ').map(|datum| format!("N35 $MA_{datum}\n")).collect();
+        import(&BY_HAND.replace(spindle, &format!("{spindle}{data}"))).loaded.machine
+    };
+    let ramp = "GEAR_STEP_SPEEDCTRL_ACCEL[1,AX3]=20 SPIND_VELO_LIMIT[AX3]=9000 GEAR_STEP_MAX_VELO_LIMIT[1,AX3]=8000";
+    let machine = with(&format!("{ramp} SPIND_ON_SPEED_AT_IPO_START[AX3]=1 SPIND_DES_VELO_TOL[0,AX3]=0.05"));
+    assert_eq!(machine.spindle_speed_max_rpm, Some(8000.0));
+    let waits = machine.spindle.expect("a spindle");
+    assert!((waits.acceleration_rad_s2 - 20.0 * TAU).abs() < 1e-12);
+    assert!(!waits.starts_at_once && waits.tolerance_share == 0.05);
+    for data in ["SPIND_ON_SPEED_AT_IPO_START[AX3]=0", "SPIND_ON_SPEED_AT_IPO_START[AX3]=1 SPIND_DES_VELO_TOL[0,AX3]=0"]
+    {
+        assert!(with(&format!("{ramp} {data}")).spindle.expect("a spindle").starts_at_once, "{data}");
+    }
+    assert!(with(ramp).spindle.is_none());
 }
 
 #[test]

@@ -73,14 +73,27 @@ fn least(draft: &mut Draft<'_>, axes: &[FoundAxis], name: &str, key: &str) {
     draft.put_number(key, *value, Origin::Datum, &source, None);
 }
 
-/// MD35200 of the first spindle, if feeds wait for it (MD35500).
+/// The first spindle, where it is said whether feeds wait for it (MD35500; with MD35150 = 0 its speed counts as reached at once).
 fn spindle(draft: &mut Draft<'_>) {
     for axis in draft.listing.axes() {
         let axis = [axis];
         let number = draft.listing.number(Scope::Axis, "SPIND_ASSIGN_TO_MACHAX", &axis, 0);
         let waits = draft.listing.number(Scope::Axis, "SPIND_ON_SPEED_AT_IPO_START", &axis, 0);
-        if !(number.is_some_and(|(number, _)| number == 1.0) && waits.is_some_and(|(waits, _)| waits > 0.0)) {
+        let Some((waits, waits_source)) = waits.filter(|_| number.is_some_and(|(number, _)| number == 1.0)) else {
             continue;
+        };
+        let tolerance = draft.listing.number(Scope::Axis, "SPIND_DES_VELO_TOL", &axis, 0);
+        let any_speed = tolerance.as_ref().is_some_and(|(tolerance, _)| *tolerance == 0.0);
+        if waits == 0.0 || any_speed {
+            let source = tolerance.as_ref().filter(|_| waits != 0.0).map_or(&waits_source, |(_, source)| source);
+            draft.put_flag("spindle.feed_starts_at_once", true, Origin::Datum, source);
+        }
+        let highest = [("SPIND_VELO_LIMIT", 0), ("GEAR_STEP_MAX_VELO_LIMIT", 1)]
+            .into_iter()
+            .filter_map(|(name, place)| draft.listing.number(Scope::Axis, name, &axis, place))
+            .min_by(|one, other| one.0.total_cmp(&other.0));
+        if let Some((value, source)) = highest {
+            draft.put_number("spindle.speed_max_rpm", value, Origin::Datum, &source, None);
         }
         let stages = [1, 0].into_iter();
         let acceleration = stages
@@ -94,7 +107,7 @@ fn spindle(draft: &mut Draft<'_>) {
             ("SPIND_POSCTRL_VELO", 0, "spindle.positioning_speed_rpm"),
             ("GEAR_STEP_POSCTRL_ACCEL", 1, "spindle.positioning_acceleration_rot_s2"),
         ];
-        for (name, place, key) in scalars {
+        for (name, place, key) in scalars.into_iter().skip(usize::from(any_speed)) {
             if let Some((value, source)) = draft.listing.number(Scope::Axis, name, &axis, place) {
                 draft.put_number(key, value, Origin::Datum, &source, None);
             }
