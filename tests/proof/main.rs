@@ -203,8 +203,8 @@ fn seven_phase_transformed() {
     prove_transformed(Law::SevenPhase);
 }
 
-/// Every limit holds. Reversed, or with a block in two, about two programs in a thousand take another time by more than they should: none of the
-/// 300, but some of the nightly run.
+/// Every limit holds. Reversed, or with a block in two, about one program in two thousand takes another time by more than it should: none of
+/// the 300, but some of the nightly run.
 #[test]
 fn continuous() {
     prove(Law::Continuous);
