@@ -396,6 +396,7 @@ fn sums_behind_lines_are_passed_over_and_said() {
 #[test]
 fn two_axes_in_one_bracket_are_no_address() {
     assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[u1,AX1]=7\n")), ["M0304"]);
+    assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1]=6 7\n")), ["M0304"]);
     assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1]=\n")), ["M0304"]);
     assert_eq!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL[0,AX1] |= 7\n")), ["M0304"]);
     assert!(codes(&format!("{PLAIN}N32300 $MA_MAX_AX_ACCEL [ 0 , ax1 ] = 7\n")).is_empty());
@@ -546,4 +547,12 @@ fn a_spindle_taken_as_an_axis_and_a_gantry_left_out() {
         ImportOptions { axes: vec![AxisChoice { theirs: "SP1".into(), ours: "C".into() }], ..ImportOptions::default() };
     let imported = import_listing(&[file("d.ini", &text)], &options).unwrap();
     assert_eq!(imported.values["axes.C.velocity_max_rpm"].value, "100.0");
+}
+
+#[test]
+fn places_that_a_listing_of_changes_leaves_out_have_the_axis_of_their_number() {
+    let changed = |line: &&str| !line.contains("MACHAX_USED") || line.contains("[3]");
+    let changes: String = FIVE.lines().filter(changed).map(|line| format!("{line}\n")).collect();
+    assert_eq!(changes.lines().count() + 4, FIVE.lines().count());
+    assert_same_machine(&import(FIVE).loaded, &import(&changes).loaded);
 }

@@ -95,14 +95,24 @@ fn chosen(draft: &mut Draft<'_>, axis: &FoundAxis) -> Option<String> {
     Some(choice.ours.clone())
 }
 
-/// Place of the axis in the channel, if MD20070 says anything.
+/// Place of the axis in the channel, if MD20070 says anything. A listing of changed data leaves places out: there the axis of the place's own number
+/// is, the default.
 fn channel_place(draft: &mut Draft<'_>, number: u32) -> Option<Option<u32>> {
     let nobody = [String::new()];
-    let used: Vec<u32> = (0..MACHINE_AXES)
-        .filter_map(|place| draft.listing.number(Scope::Channel, "AXCONF_MACHAX_USED", &nobody, place))
-        .map(|(value, _)| value as u32)
+    let mut used: Vec<Option<u32>> = (0..MACHINE_AXES)
+        .map(|place| draft.listing.number(Scope::Channel, "AXCONF_MACHAX_USED", &nobody, place))
+        .map(|found| found.map(|(value, _)| value as u32))
         .collect();
-    (!used.is_empty()).then(|| used.iter().position(|machine| *machine == number).map(|place| place as u32))
+    let told = used.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+    if used[..told].iter().all(Option::is_some) {
+        used.truncate(told);
+    }
+    let is_at = |wanted: u32| used.iter().position(|machine| *machine == Some(wanted));
+    let by_default = || {
+        let place = number.checked_sub(1)? as usize;
+        used.get(place)?.is_none().then_some(place)
+    };
+    (told > 0).then(|| is_at(number).or_else(by_default).map(|place| place as u32))
 }
 
 /// Whether it is an axis of a path.

@@ -384,7 +384,13 @@ fn literal(value: &str) -> Result<Literal, Broken> {
             u64::from_str_radix(digits, radix).map_err(|_| Broken { expected: "expected digits after 'H or 'B" })?;
         return Ok(Literal::Number(number as f64));
     }
-    let plain = value.to_ascii_uppercase().replace("EX", "E").replace(' ', "");
+    // `1 EX -5` is one number, `6 7` is two.
+    let parts: Vec<&str> = value.split_whitespace().collect();
+    let digit = |byte: Option<u8>| byte.is_some_and(|byte| byte.is_ascii_digit() || byte == b'.');
+    if parts.windows(2).any(|pair| digit(pair[0].bytes().last()) && digit(pair[1].bytes().next())) {
+        return Err(Broken { expected: "expected one number" });
+    }
+    let plain = parts.concat().to_ascii_uppercase().replace("EX", "E");
     match plain.parse::<f64>() {
         Ok(number) if number.is_finite() && !plain.contains("INF") => Ok(Literal::Number(number)),
         _ if matches!(plain.as_str(), "TRUE" | "FALSE") => Ok(Literal::Number(f64::from(u8::from(plain == "TRUE")))),
