@@ -162,7 +162,20 @@ fn in_threads<T: Send>(
 }
 
 fn options(arguments: &TuneArguments) -> Result<TuneOptions, Failure> {
-    let bounds = arguments.bounds.iter().map(|text| bound(text)).collect::<Result<_, _>>()?;
+    let gains: Vec<Gain> = arguments.gains.iter().map(|gain| gain.gain()).collect();
+    let mut bounds: Vec<(Gain, [f64; 2])> = Vec::new();
+    for text in &arguments.bounds {
+        let (gain, ends) = bound(text)?;
+        let (why, help) = if !gains.contains(&gain) {
+            ("that gain does not change", "add it to --gains, or leave the bounds out")
+        } else if bounds.iter().any(|(bounded, _)| *bounded == gain) {
+            ("that gain has bounds already", "give one --bound for each gain")
+        } else {
+            bounds.push((gain, ends));
+            continue;
+        };
+        return Err(Failure::unreadable(Diagnostic::error("C0002", format!("`--bound {text}`: {why}")).help(help)));
+    }
     Ok(TuneOptions {
         objective: match arguments.objective {
             ObjectiveChoice::Deviation => Objective::Deviation,
@@ -173,7 +186,7 @@ fn options(arguments: &TuneArguments) -> Result<TuneOptions, Failure> {
             MeasureChoice::Rms => Measure::Rms,
             MeasureChoice::Peak => Measure::Peak,
         },
-        gains: arguments.gains.iter().map(|gain| gain.gain()).collect(),
+        gains,
         bounds,
         axes: arguments.axes.clone(),
         landscape: arguments.report.is_some(),

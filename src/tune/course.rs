@@ -9,11 +9,19 @@ use crate::interpolator::{AxisSetpoint, FineInterpolator};
 use crate::interpreter::Setup;
 use crate::kernel::{Kernel, Status};
 use crate::machine::Machine;
-use crate::trace::{Method, Signal, Trace};
+use crate::trace::{Method, Signal, Trace, Zero};
 use std::sync::Arc;
 
 /// Longest course: gains need reversals and accelerations, not hours.
 pub const COURSE_MAX_S: f64 = 120.0;
+/// Errors of a trace, the most exact first.
+const ERRORS: [&str; 4] = ["control_deviation", "following_error", "position_actual", "position_measured"];
+/// A recorded feed-forward may be so much earlier or later than the set-point.
+const SWITCH_REACH_S: f64 = 0.01;
+/// Of the fastest set-point: what is slower does not tell whether feed-forward is on.
+const MOVES_SHARE: f64 = 0.05;
+/// Of the feed-forward that the speed asks for: what is less is none.
+const OFF_SHARE: f64 = 0.1;
 
 /// Set-points of one program or trace.
 #[derive(Clone, Debug)]
@@ -48,6 +56,8 @@ pub(super) struct AxisCourse {
     pub measured_lu: Option<Measured>,
     /// Measured minus simulated, with the gains of the machine; the same for both errors.
     pub offset_lu: Vec<f64>,
+    /// The error is that of an encoder with a zero of its own: its mean means nothing.
+    pub own_zero: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -168,7 +178,7 @@ fn cut(name: &str, is_cut: bool) -> Option<Diagnostic> {
 
 fn axis_course(axis: AxisId, steps: usize, positions_lu: Vec<f64>) -> AxisCourse {
     let moves = positions_lu.windows(2).any(|pair| pair[0] != pair[1]);
-    AxisCourse { axis, steps, positions_lu, moves, measured_lu: None, offset_lu: Vec::new() }
+    AxisCourse { axis, steps, positions_lu, moves, measured_lu: None, offset_lu: Vec::new(), own_zero: false }
 }
 
 /// Set-points and errors of a trace. Errors: signals that are missing, gaps.
@@ -178,9 +188,13 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
     };
     let found: Vec<(AxisId, &Signal)> =
         machine.axis_ids().filter_map(|axis| Some((axis, find(axis, "position_setpoint")?))).collect();
-    let spans = || found.iter().map(|(_, signal)| (signal.times.time_s(0), signal.times.time_s(signal.len() - 1)));
-    let start_s = spans().map(|span| span.0).fold(f64::NEG_INFINITY, f64::max);
-    let end_s = spans().map(|span| span.1).fold(f64::INFINITY, f64::min);
+    let errors = |axis: AxisId| ERRORS.iter().find_map(|stem| find(axis, stem).map(|signal| (*stem, signal)));
+    let used = found.iter().flat_map(|(axis, signal)| [Some(*signal), errors(*axis).map(|(_, signal)| signal)]);
+    // A late signal shows what belongs to an earlier time.
+    let span = |signal: &Signal| [0, signal.len() - 1].map(|row| signal.times.time_s(row) - signal.meaning.delay_s);
+    let spans: Vec<[f64; 2]> = used.flatten().map(span).collect();
+    let start_s = spans.iter().map(|span| span[0]).fold(f64::NEG_INFINITY, f64::max);
+    let end_s = spans.iter().map(|span| span[1]).fold(f64::INFINITY, f64::min);
     let period_s = machine.cycle.time_base.setpoint_period_s();
     let steps = ((end_s - start_s).min(COURSE_MAX_S) / period_s + 1e-6).floor();
     if found.is_empty() || steps.is_nan() || steps < 1.0 {
@@ -197,19 +211,18 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
         let times: Vec<f64> = (0..=steps as usize * ratio as usize).map(|k| start_s + k as f64 * cycle_s).collect();
         let mut course =
             axis_course(*axis, ratio as usize, resampled(signal, &times, machine.axis(*axis).kind, &trace.name)?);
-        let of = |stem: &str| {
-            find(*axis, stem).map(|signal| resampled(signal, &times, machine.axis(*axis).kind, &trace.name))
-        };
-        course.measured_lu = match (of("control_deviation"), of("following_error"), of("position_actual")) {
-            (Some(deviation), ..) => Some(Measured::Deviation(deviation?)),
-            (None, Some(lag), _) => Some(Measured::Following(lag?)),
-            (None, None, Some(actual)) => {
-                let actual = actual?;
-                let lag = course.positions_lu.iter().zip(&actual).map(|(sent, actual)| sent - actual);
-                Some(Measured::Following(lag.collect()))
-            }
-            (None, None, None) => None,
-        };
+        if let Some((stem, signal)) = errors(*axis) {
+            let values = resampled(signal, &times, machine.axis(*axis).kind, &trace.name)?;
+            course.measured_lu = Some(match stem {
+                "control_deviation" => Measured::Deviation(values),
+                "following_error" => Measured::Following(values),
+                _ => {
+                    course.own_zero = signal.meaning.zero == Zero::Encoder;
+                    let lag = course.positions_lu.iter().zip(&values).map(|(sent, actual)| sent - actual);
+                    Measured::Following(lag.collect())
+                }
+            });
+        }
         if course.moves && course.measured_lu.is_none() {
             let name = &machine.axis(*axis).name;
             let message = format!("`{}` has set-points of {name}, and no error of it", trace.name);
@@ -229,18 +242,66 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
         }))
     };
     let postures = (0..rows).map(posture).collect();
-    let (name, active) = (trace.name.clone(), vec![true; rows]);
+    let name = trace.name.clone();
+    let feedforward = |axis: AxisId| find(axis, "velocity_feedforward");
+    let row_times: Vec<f64> = (0..rows).map(|k| start_s + k as f64 * period_s).collect();
+    let active = switched(machine, &axes, feedforward, &row_times);
     Ok(Course { name, validates, measured: true, duration_s: steps * period_s, warnings, axes, postures, active })
 }
 
+/// Feed-forward at every row, as a recorded velocity feed-forward tells while axes move; on where none does. At rest nothing tells: it is as
+/// it was, and before the first move as in it.
+fn switched<'t>(
+    machine: &Machine,
+    axes: &[AxisCourse],
+    feedforward: impl Fn(AxisId) -> Option<&'t Signal>,
+    times: &[f64],
+) -> Vec<bool> {
+    let mut told: Vec<Option<bool>> = vec![None; times.len()];
+    let period_s = times.get(1).map_or(1.0, |second| second - times[0]);
+    let reach = (SWITCH_REACH_S / period_s).ceil() as usize;
+    for course in axes {
+        let axis = machine.axis(course.axis);
+        let weight = axis.drive.as_ref().map_or(0.0, |data| data.velocity_feedforward_ratio);
+        let Some(signal) = feedforward(course.axis).filter(|_| weight > 0.0) else { continue };
+        let recorded: Vec<f64> =
+            at_times(signal, times).iter().map(|value| from_border(axis.kind, *value).abs()).collect();
+        let sent: Vec<f64> = course.positions_lu.iter().step_by(course.steps).copied().collect();
+        let wanted: Vec<f64> = sent.windows(2).map(|pair| weight * (pair[1] - pair[0]).abs() / period_s).collect();
+        let fast = MOVES_SHARE * wanted.iter().copied().fold(0.0, f64::max);
+        for (row, wanted) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted > fast) {
+            let near = &recorded[row.saturating_sub(reach)..(row + reach + 1).min(recorded.len())];
+            // Where the feed-forward waits for the drive it is smaller for some cycles: only what is near nothing is off.
+            let largest = near.iter().copied().fold(f64::NAN, f64::max);
+            if largest.is_finite() {
+                told[row] = Some(told[row].unwrap_or(false) || largest > OFF_SHARE * wanted);
+            }
+        }
+    }
+    let mut state = told.iter().flatten().next().copied().unwrap_or(true);
+    let hold = |told: &Option<bool>| {
+        state = told.unwrap_or(state);
+        state
+    };
+    told.iter().map(hold).collect()
+}
+
+/// Values at our times; a late signal is looked up later.
+fn at_times(signal: &Signal, times: &[f64]) -> Vec<f64> {
+    let late: Vec<f64> = times.iter().map(|time_s| time_s + signal.meaning.delay_s).collect();
+    signal.resampled(&late, Method::Linear)
+}
+
+fn from_border(kind: AxisKind, value: f64) -> f64 {
+    if kind == AxisKind::Rotary { rad_from_deg(value) } else { value }
+}
+
 fn resampled(signal: &Signal, times: &[f64], kind: AxisKind, name: &str) -> Result<Vec<f64>, Diagnostic> {
-    let mut values = signal.resampled(times, Method::Linear);
+    let mut values = at_times(signal, times);
     if let Some(row) = values.iter().position(|value| value.is_nan()) {
         let message = format!("`{name}`: `{}` has a gap at {:.6} s", signal.original, times[row]);
         return Err(Diagnostic::error("U0001", message).help("export a part without gaps"));
     }
-    if kind == AxisKind::Rotary {
-        values.iter_mut().for_each(|value| *value = rad_from_deg(*value));
-    }
+    values.iter_mut().for_each(|value| *value = from_border(kind, *value));
     Ok(values)
 }

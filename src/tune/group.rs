@@ -12,10 +12,10 @@ use super::figures::{CourseFigures, Sensitivity, course_figures, sensitivities};
 use super::fit::{Point, gauss_newton, points, scan};
 use super::gains::{Gain, Gains, range};
 use super::landscape::{Map, maps};
+use super::notes::{apart, outside};
 use super::search::search;
 use super::simulate::{Job, calibrate, responses};
 use super::{Measure, Objective, TuneOptions};
-use crate::base::units::MS_PER_S;
 use crate::base::{AxisId, AxisKind, Diagnostic};
 use crate::machine::{DriveData, Machine};
 use rayon::prelude::*;
@@ -103,6 +103,8 @@ pub(super) struct Slot {
     pub gain: Gain,
     pub members: Vec<usize>,
     pub range: [f64; 2],
+    /// The bounds are the user's: what the machine has must be inside them too.
+    pub binds: bool,
 }
 
 /// Axes tuned together.
@@ -323,9 +325,9 @@ impl Group<'_> {
             && mean > CERTAIN_ERRORS * (variance / count).sqrt()
     }
 
-    /// Gains inside the bounds.
-    fn inside(&self, mut gains: Vec<Gains>) -> Vec<Gains> {
-        for slot in &self.slots {
+    /// Gains inside the bounds; `binding`: only inside those that the user gave.
+    fn inside(&self, mut gains: Vec<Gains>, binding: bool) -> Vec<Gains> {
+        for slot in self.slots.iter().filter(|slot| slot.binds || !binding) {
             for member in &slot.members {
                 let own = gains[*member].get(slot.gain).clamp(slot.range[0], slot.range[1]);
                 gains[*member] = gains[*member].with(slot.gain, own);
@@ -355,15 +357,16 @@ impl Group<'_> {
 
     /// New gains, and how certain they are.
     fn tuned(&self) -> (Vec<Gains>, Vec<Certainty>, Option<&'static str>) {
-        let before = self.inside(self.before());
+        // The usual bounds are for the search: gains of the machine outside them may stay.
+        let before = self.inside(self.before(), true);
         let theory = self.theory();
         // Axes that had delays of their own start with one: that of the first.
-        let mut start = before.clone();
+        let mut start = self.inside(before.clone(), false);
         self.slots.iter().for_each(|slot| self.put(&mut start, slot, self.value(&before, slot)));
-        let own_delays = start != before;
+        let is_elsewhere = start != before;
         let starts = if theory == start { vec![start] } else { vec![start, theory.clone()] };
         let Some((mut old, new)) = self.found(starts, &theory) else { return (before, Vec::new(), None) };
-        if own_delays && let Some(point) = points(self, vec![before.clone()], &theory).pop() {
+        if is_elsewhere && let Some(point) = points(self, vec![before.clone()], &theory).pop() {
             old = point;
         }
         let found = self.rounded(&new.gains);
@@ -375,7 +378,11 @@ impl Group<'_> {
                 .zip(&self.slots)
                 .any(|(certainty, slot)| slot.gain == Gain::Delay && !certainty.certain);
         let kept = if found == before {
-            Some("the best gains found are those of the machine")
+            Some(if before == self.before() {
+                "the best gains found are those of the machine"
+            } else {
+                "the best gains found are those of the machine, brought inside the bounds of --bound"
+            })
         } else if untold {
             Some("the paths do not tell the common delay, and without it the other gains say nothing: kept")
         } else if !self.better(&old, &new) {
@@ -433,6 +440,7 @@ pub fn tune(
         };
         let group = group(machine, &courses[..training], &tool, &paths_mm, members, own_objective, options);
         let (gains, certainty, kept) = group.tuned();
+        warnings.extend(outside(&group));
         if let Some(why) = kept {
             warnings.push(Diagnostic::note("U0003", format!("{}: {why}", names.join(", "))));
         }
@@ -456,28 +464,6 @@ pub fn tune(
     let figures = course_figures(machine, &courses, &tool, &paths_mm, &after, options.objective);
     let sensitivities = sensitivities(machine, &courses[..training], &tool, &paths_mm, &after, options.objective);
     Ok(Tuned { axes, courses: figures, sensitivities, landscapes, warnings, simulations })
-}
-
-/// Axes that move the tool, were not tuned, and have another delay now than those that were: paths of both bend.
-fn apart(machine: &Machine, after: &[(AxisId, Gains)]) -> Option<Diagnostic> {
-    const SAME_S: f64 = 20e-6;
-    let (_, gains) = after.iter().find(|(axis, _)| moves_tool(machine, *axis))?;
-    let delay_s = gains.get(Gain::Delay);
-    let other = |axis: &AxisId| {
-        let data = machine.axis(*axis).drive.as_ref();
-        let differs = data.is_some_and(|data| (data.setpoint_delay_s - delay_s).abs() > SAME_S);
-        moves_tool(machine, *axis) && differs && after.iter().all(|(tuned, _)| tuned != axis)
-    };
-    let names: Vec<&str> = machine.axis_ids().filter(other).map(|axis| machine.axis(axis).name.as_str()).collect();
-    (!names.is_empty()).then(|| {
-        let message = format!(
-            "{}: not tuned, and the delay differs from the {:.3} ms of the axes that were: paths on which both move bend",
-            names.join(", "),
-            delay_s * MS_PER_S
-        );
-        let help = "tune on programs in which all axes of the tool move";
-        Diagnostic::warning("U0007", message).help(help)
-    })
 }
 
 /// Axes with a drive that move, one group or one each.
@@ -535,13 +521,14 @@ fn group<'a>(
             Some(Member { axis: *id, data, ranges })
         })
         .collect();
+    let binds = |gain: &Gain| options.bounds.iter().any(|(bounded, _)| bounded == gain);
     let mut slots: Vec<Slot> = Vec::new();
     for (place, member) in members.iter().enumerate() {
         for (gain, range) in &member.ranges {
             let shared = *gain == Gain::Delay;
             match slots.iter_mut().find(|slot| shared && slot.gain == Gain::Delay) {
                 Some(slot) => slot.members.push(place),
-                None => slots.push(Slot { gain: *gain, members: vec![place], range: *range }),
+                None => slots.push(Slot { gain: *gain, members: vec![place], range: *range, binds: binds(gain) }),
             }
         }
     }
@@ -569,7 +556,7 @@ fn tuned_axes(group: &Group<'_>, gains: &[Gains], certainty: &[Certainty]) -> Ve
                 value: shown(inside),
                 low: shown(certainty.low),
                 high: shown(certainty.high),
-                at_bound: inside <= slot.range[0] + margin || inside >= slot.range[1] - margin,
+                at_bound: slot.range.iter().any(|bound| (inside - bound).abs() <= margin),
                 certain: certainty.certain,
             });
         }

@@ -21,6 +21,7 @@ mod gains;
 mod group;
 mod landscape;
 mod normal;
+mod notes;
 mod search;
 mod simulate;
 

@@ -4,6 +4,7 @@
 //! all bounds has an infinite error.
 
 use super::course::{Course, Measured};
+use crate::base::Diagnostic;
 use crate::drive::{AxisDrive, DriveBatch, DriveInput, Start};
 use crate::machine::{DriveData, Machine};
 use rayon::prelude::*;
@@ -77,6 +78,17 @@ fn bounded(error_lu: f64) -> f64 {
     if error_lu.is_nan() { LARGEST_LU } else { error_lu.clamp(-LARGEST_LU, LARGEST_LU) }
 }
 
+/// RMS distance of trace and model over the RMS of the trace above which the model says little about the machine.
+const FAR_SHARE: f64 = 0.5;
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
 /// Brings the simulation with the machine's gains onto the measured errors of a trace: what is not in the model stays as it was measured.
 pub(super) fn calibrate(machine: &Machine, courses: &mut [Course]) {
     for course in courses.iter_mut().filter(|course| course.measured) {
@@ -93,7 +105,24 @@ pub(super) fn calibrate(machine: &Machine, courses: &mut [Course]) {
                 Measured::Deviation(measured) => (measured, &simulated.deviation_lu),
                 Measured::Following(measured) => (measured, &simulated.following_lu),
             };
-            axis.offset_lu = measured.iter().zip(simulated).map(|(measured, simulated)| measured - simulated).collect();
+            let mut offset_lu: Vec<f64> =
+                measured.iter().zip(simulated).map(|(measured, simulated)| measured - simulated).collect();
+            let zero_lu = if axis.own_zero { mean(&offset_lu) } else { 0.0 };
+            offset_lu.iter_mut().for_each(|offset| *offset -= zero_lu);
+            let measured_lu: Vec<f64> = measured.iter().map(|measured| measured - zero_lu).collect();
+            let [apart_lu, whole_lu] = [rms(&offset_lu), rms(&measured_lu)];
+            if axis.moves && apart_lu > FAR_SHARE * whole_lu {
+                let name = &machine.axis(axis.axis).name;
+                let message = format!(
+                    "`{}`: the error of {name} and that of its model are {:.0} % of it apart: gains tuned on this may be wrong",
+                    course.name,
+                    apart_lu / whole_lu * 100.0
+                );
+                course.warnings.push(Diagnostic::warning("U0008", message).help(
+                    "was feed-forward on (FFWON) and are these the gains of the recording? Else identify the drive (`sollwert identify`) first",
+                ));
+            }
+            axis.offset_lu = offset_lu;
         }
     }
 }

@@ -219,6 +219,30 @@ fn a_spindle_has_its_highest_speed_and_its_waits() {
 }
 
 #[test]
+fn data_without_the_datum_that_switches_them_are_used_or_listed() {
+    let with = |drop: &[&str], more: &str| {
+        let lines = BY_HAND.lines().filter(|line| !drop.iter().any(|word| line.contains(word)));
+        import(&(lines.collect::<Vec<_>>().join("\n") + "\n" + more))
+    };
+    let number = |imported: &Imported, key: &str| imported.values[key].value.parse::<f64>().unwrap();
+    // Without p0341 what the control has been told is better than a guess; so is the load.
+    let inertia = "axes.X.mechanics.inertia_kg_m2";
+    let imported = with(&["p341", "p0341"], "");
+    assert_eq!((number(&imported, inertia), imported.values[inertia].origin), (0.018, Origin::Derived));
+    let imported = with(&["p341", "p0341", "AX_INERTIA", "p1498"], "p1498[0]=0.007\n");
+    assert_eq!((number(&imported, inertia), imported.values[inertia].origin), (0.007, Origin::Derived));
+    // Without MD32620: mode 3 as a machine file without the key, and said. The delay of the other modes is listed.
+    let more = "N32800 $MA_EQUIV_CURRCTRL_TIME[0,AX1]=0.0007\nN32810 $MA_EQUIV_SPEEDCTRL_TIME[0,AX1]=0.0025\n";
+    let imported = with(&["FFW_MODE", "EQUIV_"], more);
+    assert_eq!(number(&imported, "axes.X.drive.setpoint_delay_ms"), 2.5);
+    assert_eq!(number(&imported, "axes.X.drive.feedforward_inertia_kg_m2"), 0.018);
+    assert_eq!(imported.values["axes.X.drive.feedforward_balancing"].origin, Origin::Assumed);
+    assert!(imported.warnings.iter().any(|warning| warning.message.contains("no MD32620")), "{:?}", imported.warnings);
+    assert!(imported.unknown.iter().any(|unknown| unknown.datum.contains("EQUIV_CURRCTRL_TIME")));
+    assert!(imported.unknown.iter().all(|unknown| !unknown.datum.contains("EQUIV_SPEEDCTRL_TIME")));
+}
+
+#[test]
 fn what_is_unknown_is_counted_once_a_datum() {
     let mut text = BY_HAND.to_owned();
     for place in 0..7 {

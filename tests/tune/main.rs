@@ -4,6 +4,7 @@
 mod random;
 mod foreign;
 mod odd;
+mod recorded;
 mod trust;
 
 use random::Random;

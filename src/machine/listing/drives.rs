@@ -3,7 +3,7 @@
 //! In: the drive objects of the listing (members `PS0000nn` of an archive, sections of a file). Out: keys of `drive`, `motor`,
 //! `mechanics`. An object belongs to the axis that the user or a comment names, else to the one whose name its own name (p0199) holds:
 //! `AXX_00` is X, `SERVO_Y1` is Y. Data set 0 counts. Inertia: p0341 p0342 + p1498; where p1498 is 0 the control has not been told the
-//! load, and MD32650, if larger, is the better guess.
+//! load, and MD32650, if larger, is the better guess; so it is where p0341 is missing.
 
 use super::axes::FoundAxis;
 use super::data::{DriveObject, Scope};
@@ -131,7 +131,15 @@ fn inertia(draft: &mut Draft<'_>, axis: &FoundAxis, object: &mut DriveObject, li
         false => ("mechanics.inertia_kg_m2", "AX_INERTIA"),
     };
     let whole = draft.listing.number(Scope::Axis, name, &axis.theirs, 0);
-    let Some(motor) = motor else { return };
+    let Some(motor) = motor else {
+        // The control has been told the whole; of the load alone it is at least known that there is no less.
+        let told = whole.filter(|(whole, _)| *whole > load);
+        let load = (load > 0.0).then(|| (load, "p1498, the load alone: no p0341".to_owned()));
+        if let Some((value, source)) = told.or(load) {
+            draft.put_number(&axis.key(key), value, Origin::Derived, &source, None);
+        }
+        return;
+    };
     let of_drive = motor * ratio + load;
     match whole {
         Some((whole, source)) if load == 0.0 && whole > of_drive => {

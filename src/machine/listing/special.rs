@@ -1,7 +1,7 @@
 //! Keys that take more than one machine datum: modes, cycles, travel, gears, feed-forward, encoders; and what is assumed where data are silent.
 //!
 //! In: the draft with its single keys. Out: the rest of the keys. Rules: MD32620 decides which delay holds (MD32810 with modes 1 and 3, MD32800
-//! with 2 and 4) and 0 switches both feed-forwards off; MD31060 / MD31050 is motor turns per load turn; MD32100 = -1 turns the sign of the
+//! with 2 and 4) and 0 switches both feed-forwards off; without it 3 is assumed, and said; MD31060 / MD31050 is motor turns per load turn; MD32100 = -1 turns the sign of the
 //! transmission; a pulse of friction compensation counts if MD32500 is 1. A drive needs motor data: without, the axis is ideal.
 
 use super::axes::FoundAxis;
@@ -22,6 +22,9 @@ pub(super) const JERK_FILTERS: [&str; 5] =
 pub(super) const COMPRESSOR_BLOCKS: [&str; 4] = ["lines", "arcs", "rapids", "all"];
 /// A travel limit of this or more is none: the control writes 1e8.
 pub(super) const NO_TRAVEL_LIMIT: f64 = 99_999_999.0;
+
+/// A machine file that says nothing has this mode too.
+const ASSUMED_MODE: &str = "assumed: no MD32620, taken as 3";
 
 /// The control: cycles, modes.
 pub(super) fn control(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
@@ -181,14 +184,16 @@ fn transmission(draft: &mut Draft<'_>, axis: &FoundAxis) {
 
 /// MD32620 and what hangs on it.
 fn feedforward(draft: &mut Draft<'_>, axis: &FoundAxis) {
-    let mode = draft.listing.number(Scope::Axis, "FFW_MODE", &axis.theirs, 0);
-    let inertia = draft.listing.number(Scope::Axis, "AX_INERTIA", &axis.theirs, 0);
-    let mass = draft.listing.number(Scope::Axis, "AX_MASS", &axis.theirs, 0);
-    let torque_time = draft.listing.number(Scope::Axis, "EQUIV_CURRCTRL_TIME", &axis.theirs, 0);
-    let speed_time = draft.listing.number(Scope::Axis, "EQUIV_SPEEDCTRL_TIME", &axis.theirs, 0);
-    let Some((mode, source)) = mode else { return };
-    let torque = mode == 2.0 || mode == 4.0;
     let weight_key = axis.key("drive.torque_feedforward");
+    let Some((mode, source)) = draft.listing.number(Scope::Axis, "FFW_MODE", &axis.theirs, 0) else {
+        let hangs_on_it = ["AX_INERTIA", "AX_MASS", "EQUIV_SPEEDCTRL_TIME"];
+        if hangs_on_it.iter().any(|name| draft.listing.spot(Scope::Axis, name, &axis.theirs, 0).is_some()) {
+            draft.put_word(&axis.key("drive.feedforward_balancing"), "dead_time", Origin::Assumed, ASSUMED_MODE);
+            inertia_and_delay(draft, axis, 1.0, "EQUIV_SPEEDCTRL_TIME");
+        }
+        return;
+    };
+    let torque = mode == 2.0 || mode == 4.0;
     if mode == 0.0 {
         draft.put_number(&axis.key("drive.velocity_feedforward"), 0.0, Origin::Datum, &source, None);
         draft.put_number(&weight_key, 0.0, Origin::Datum, &source, None);
@@ -200,14 +205,19 @@ fn feedforward(draft: &mut Draft<'_>, axis: &FoundAxis) {
     // The control has no weight beside the inertia: a comment of ours may split their product.
     draft.put_number(&weight_key, weight, if torque { Origin::Derived } else { Origin::Datum }, &source, None);
     let weight = if torque { draft.number_of(&weight_key).filter(|weight| *weight > 0.0).unwrap_or(1.0) } else { 1.0 };
-    for (datum, key) in [(inertia, "drive.feedforward_inertia_kg_m2"), (mass, "drive.feedforward_mass_kg")] {
-        if let Some((value, source)) = datum
+    inertia_and_delay(draft, axis, weight, if torque { "EQUIV_CURRCTRL_TIME" } else { "EQUIV_SPEEDCTRL_TIME" });
+}
+
+/// What the torque feed-forward is told, and the delay that holds in the mode. The other delay stays unused, and is listed so.
+fn inertia_and_delay(draft: &mut Draft<'_>, axis: &FoundAxis, weight: f64, delay: &str) {
+    for (name, key) in [("AX_INERTIA", "drive.feedforward_inertia_kg_m2"), ("AX_MASS", "drive.feedforward_mass_kg")] {
+        if let Some((value, source)) = draft.listing.number(Scope::Axis, name, &axis.theirs, 0)
             && value > 0.0
         {
             draft.put_number(&axis.key(key), value / weight, Origin::Datum, &source, None);
         }
     }
-    if let Some((time_s, source)) = if torque { torque_time } else { speed_time } {
+    if let Some((time_s, source)) = draft.listing.number(Scope::Axis, delay, &axis.theirs, 0) {
         let spot = draft.listing.spot(Scope::Axis, "FFW_MODE", &axis.theirs, 0);
         let key = axis.key("drive.setpoint_delay_ms");
         draft.put_number(&key, Unit::Time.to_key(axis.kind, time_s), Origin::Datum, &source, spot.as_ref());
@@ -362,7 +372,12 @@ pub(super) fn assume(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
             lacking.extend(drive_stand_ins(axis, linear_motor));
         }
     }
-    let mut assumed = Vec::new();
+    let of_mode = |axis: &FoundAxis| {
+        let key = axis.key("drive.feedforward_balancing");
+        let is_assumed = draft.values.get(&key).is_some_and(|sourced| sourced.source == ASSUMED_MODE);
+        is_assumed.then(|| format!("{key} = dead_time (no MD32620: taken as 3)"))
+    };
+    let mut assumed: Vec<String> = axes.iter().filter_map(of_mode).collect();
     for (key, value) in lacking {
         let needed = key_row(&key).is_some_and(needed) || key.ends_with("gear_ratio") || key.ends_with("pitch_mm");
         if needed && !draft.values.contains_key(&key) {
