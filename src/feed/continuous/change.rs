@@ -245,7 +245,7 @@ impl Continuous {
             None => vec![Vec::new(), self.hints(&layout.chain).0],
             Some(longer) => vec![longer.shortened(&layout.chain, way_lu)],
         };
-        // It ends at rest, and is gone along to its end.
+        // Of a plan to a stop all is gone along; of one to another feed the tangents fit further than they need to.
         (self.planning.hurries, self.planning.is_last) = (true, true);
         let profile = {
             let look = look(pieces, &layout.owners);

@@ -120,7 +120,7 @@ pub(super) fn stretches(
     stretches
 }
 
-/// All of an interval may begin with a state, or there is no way to find a part of it that may.
+/// All of an interval may begin with a state: there, and half of it later, the speed is within what it allows.
 fn fits(entry: &PathPoint, interval: &Interval) -> bool {
     let length_lu = interval.length_lu();
     let b = entry.speed_squared_lu2_s2 + 0.5 * length_lu * entry.slope_lu_s2.max(0.0);
