@@ -12,25 +12,8 @@
 //! given, or any point of a ray.
 //! Does not know what b, limits and intervals mean.
 
-/// One limit: `a . (x0, x1, u) <= bound`, with its slack and multiplier.
-#[derive(Clone, Copy, Debug)]
-struct Row {
-    a: [f64; 3],
-    bound: f64,
-    /// Never gives way.
-    holds: bool,
-    label: Label,
-    slack: f64,
-    multiplier: f64,
-    /// 1/slack, 1/multiplier and multiplier/slack at the present point.
-    inverse: f64,
-    multiplier_inverse: f64,
-    weight: f64,
-    residual: f64,
-    slack_step: f64,
-    multiplier_step: f64,
-    correction: f64,
-}
+use super::limit_lanes::{Block, LANES, Prediction, Sums, greater, sum};
+use multiversion::multiversion;
 
 /// What a limit belongs to; a label of the caller's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +24,16 @@ pub(super) enum Label {
     State,
     /// The highest of the first component of the state.
     Cap,
+    /// There is no limit.
+    None,
+}
+
+/// What is known of a limit besides its numbers; of a lane without a limit nothing.
+#[derive(Clone, Copy, Debug)]
+struct Title {
+    label: Label,
+    /// Never gives way.
+    holds: bool,
 }
 
 /// From the state at the start of an interval to that at its end: `x+ = A x + B u`.
@@ -55,9 +48,13 @@ pub(super) struct Transition {
 /// What is to be solved.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Problem {
-    rows: Vec<Row>,
-    /// Rows of node i are `ends[i - 1] .. ends[i]`.
+    blocks: Vec<Block>,
+    /// What the limits are called, in the order of the lanes of all blocks.
+    titles: Vec<Title>,
+    /// Blocks of node i are `ends[i - 1] .. ends[i]`.
     ends: Vec<usize>,
+    /// Limits so far.
+    limits: usize,
     /// c of every node.
     pub costs_ratio: Vec<f64>,
     /// Of every interval.
@@ -69,8 +66,10 @@ pub(super) struct Problem {
 impl Problem {
     /// Forgets everything but its memory.
     pub fn clear(&mut self) {
-        self.rows.clear();
+        self.blocks.clear();
+        self.titles.clear();
         self.ends.clear();
+        self.limits = 0;
         self.costs_ratio.clear();
         self.transitions.clear();
         self.start_ray_ratio = None;
@@ -78,79 +77,96 @@ impl Problem {
 
     /// A limit of the node at hand and the interval after it.
     pub fn limit(&mut self, label: Label, a_ratio: [f64; 3], bound_ratio: f64) {
-        self.rows.push(Row {
-            a: a_ratio,
-            bound: bound_ratio,
-            holds: false,
-            label,
-            slack: 0.0,
-            multiplier: 0.0,
-            inverse: 0.0,
-            multiplier_inverse: 0.0,
-            weight: 0.0,
-            residual: 0.0,
-            slack_step: 0.0,
-            multiplier_step: 0.0,
-            correction: 0.0,
-        });
+        let begun = self.blocks.len() * LANES;
+        if self.titles.len() == begun {
+            self.blocks.push(Block::default());
+        }
+        let lane = self.titles.len() % LANES;
+        if let Some(block) = self.blocks.last_mut() {
+            block.set(lane, a_ratio, bound_ratio);
+        }
+        self.titles.push(Title { label, holds: false });
+        self.limits += 1;
     }
 
     /// Limits of the node at hand so far, to be rewritten in place where the interval after it has no control.
     pub fn without_control(&mut self, feedback_ratio: [f64; 2]) {
         let start = self.ends.last().copied().unwrap_or(0);
-        for row in &mut self.rows[start..] {
-            row.a = [row.a[0] + row.a[2] * feedback_ratio[0], row.a[1] + row.a[2] * feedback_ratio[1], 0.0];
+        for block in &mut self.blocks[start..] {
+            block.put_control(feedback_ratio);
         }
     }
 
     /// The last limit never gives way.
     pub fn hold_last(&mut self) {
-        if let Some(row) = self.rows.last_mut() {
-            row.holds = true;
+        if let Some(title) = self.titles.last_mut() {
+            title.holds = true;
         }
     }
 
     /// Every limit that may give way counts as so much wider.
     pub fn loosen(&mut self, by_ratio: f64) {
-        for row in self.rows.iter_mut().filter(|row| !row.holds) {
-            row.bound += by_ratio * row.bound.abs().min(1.0);
+        for (block, titles) in self.blocks.iter_mut().zip(self.titles.chunks(LANES)) {
+            for (lane, title) in titles.iter().enumerate() {
+                if !title.holds {
+                    block.loosen(lane, by_ratio);
+                }
+            }
         }
     }
 
     /// The limits of the node at hand are complete.
     pub fn end_node(&mut self) {
-        self.ends.push(self.rows.len());
+        // Lanes without a limit are no limits either way.
+        self.titles.resize(self.blocks.len() * LANES, Title { label: Label::None, holds: true });
+        self.ends.push(self.blocks.len());
     }
 
-    fn rows_of(&self, node: usize) -> &[Row] {
+    /// Label, factor of the control, slack and multiplier of the limits of a node.
+    fn limits_of(&self, node: usize) -> impl Iterator<Item = Held> {
         let start = node.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.rows[start..self.ends[node]]
+        (start..self.ends[node]).flat_map(move |index| {
+            (0..LANES).map(move |lane| {
+                let (control, slack, multiplier) = self.blocks[index].held(lane);
+                Held { label: self.titles[index * LANES + lane].label, control, slack, multiplier }
+            })
+        })
     }
 
     /// Sum of the multipliers of a node with this label, after a solution: by how much the cost falls if those limits become wider by 1.
     pub fn price_ratio(&self, node: usize, label: impl Fn(Label) -> bool) -> f64 {
-        self.rows_of(node).iter().filter(|row| label(row.label)).map(|row| row.multiplier).sum()
+        self.limits_of(node).filter(|limit| label(limit.label)).map(|limit| limit.multiplier).sum()
     }
 
     /// By how much the cost would fall, about, if the control after a node could be another one at each of the three places that hold it: to first
     /// order. What pushes to one side gains with what each place leaves unused, no more than all of the limit; where one place pushes up and
     /// another one down (`pinched`: that counts too) they hold the state between them, and each would go by a whole limit.
     pub fn unused_ratio(&self, node: usize, pinched: bool) -> f64 {
-        let held = || self.rows_of(node).iter().filter(|row| matches!(row.label, Label::Place(_)));
-        let most = held().filter(|row| row.multiplier > 0.0).map(|row| row.a[2].abs()).fold(0.0, f64::max);
+        let held = || self.limits_of(node).filter(|limit| matches!(limit.label, Label::Place(_)));
+        let most = held().filter(|limit| limit.multiplier > 0.0).map(|limit| limit.control.abs()).fold(0.0, f64::max);
         if most == 0.0 {
             return 0.0;
         }
-        let at = |place: u8| held().filter(move |row| row.label == Label::Place(place));
-        let prices = [0, 1, 2].map(|place| at(place).map(|row| row.multiplier * row.a[2]).sum::<f64>());
+        let at = |place: u8| held().filter(move |limit| limit.label == Label::Place(place));
+        let prices = [0, 1, 2].map(|place| at(place).map(|limit| limit.multiplier * limit.control).sum::<f64>());
         let [up, down] = [1.0, -1.0].map(|sign| prices.iter().map(|price| (sign * price).max(0.0)).sum::<f64>());
         let free = |place: u8| {
-            let rows = at(place).filter(|row| row.a[2] * (up - down) > 0.0);
-            rows.map(|row| row.slack / row.a[2].abs()).fold(1.0 / most, f64::min)
+            let limits = at(place).filter(|limit| limit.control * (up - down) > 0.0);
+            limits.map(|limit| limit.slack / limit.control.abs()).fold(1.0 / most, f64::min)
         };
         (up - down).abs() * (0.25 * free(0) + 0.5 * free(1) + 0.25 * free(2))
             + if pinched { up.min(down) / most } else { 0.0 }
     }
+}
+
+/// A limit after a solution.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    label: Label,
+    /// Factor of the control.
+    control: f64,
+    slack: f64,
+    multiplier: f64,
 }
 
 /// Work of one node.
@@ -160,6 +176,8 @@ struct Node {
     control: f64,
     state_step: [f64; 2],
     control_step: f64,
+    /// Steps of state and control in the affine direction.
+    affine: [f64; 3],
     /// Missing in the transition to the next node.
     gap: [f64; 2],
     /// Hessian: 00, 01, 11, 0u, 1u, uu.
@@ -233,10 +251,10 @@ impl Solver {
 
     /// Solves to a cost within `gap_max_ratio` of the least, absolute, in `steps_max` steps.
     pub fn solve(&mut self, problem: &mut Problem, gap_max_ratio: f64, steps_max: u32) -> Outcome {
-        if self.nodes.len() != problem.transitions.len() + 1 || problem.rows.is_empty() {
+        if self.nodes.len() != problem.transitions.len() + 1 || problem.limits == 0 {
             return Outcome::Failed;
         }
-        let count = problem.rows.len() as f64;
+        let count = problem.limits as f64;
         self.first_slacks(problem, count);
         let (mut stalls, mut step) = (0, 0.0);
         for _ in 0..steps_max {
@@ -267,13 +285,11 @@ impl Solver {
 
     fn first_slacks(&self, problem: &mut Problem, count: f64) {
         let product = 3.0 * problem.costs_ratio.iter().sum::<f64>() / count;
-        let Problem { rows, ends, .. } = problem;
+        let Problem { blocks, ends, .. } = problem;
         let mut first = 0;
         for (node, end) in self.nodes.iter().zip(ends.iter()) {
-            for row in &mut rows[first..*end] {
-                let left = row.bound - row.along(&node.state, node.control);
-                row.slack = left.max(SLACK_START_MIN);
-                row.multiplier = product / row.slack;
+            for block in &mut blocks[first..*end] {
+                block.begin(&node.state, node.control, SLACK_START_MIN, product);
             }
             first = *end;
         }
@@ -287,7 +303,7 @@ impl Solver {
             node.state[1] += step * node.state_step[1];
             node.control += step * node.control_step;
         }
-        let (mut total, mut residual) = (0.0, 0.0_f64);
+        let mut residual = 0.0_f64;
         for i in 0..problem.transitions.len() {
             let (x, u, next) = (self.nodes[i].state, self.nodes[i].control, self.nodes[i + 1].state);
             let reached = problem.transitions[i].apply(&x, u);
@@ -295,39 +311,8 @@ impl Solver {
             residual = residual.max(gap[0].abs()).max(gap[1].abs());
             self.nodes[i].gap = gap;
         }
-        let Problem { rows, ends, costs_ratio, .. } = problem;
-        let mut first = 0;
-        for ((node, end), cost) in self.nodes.iter_mut().zip(ends.iter()).zip(costs_ratio.iter()) {
-            let b = node.state[0].max(f64::MIN_POSITIVE);
-            let root = b.sqrt();
-            let mut force = [-0.5 * cost / (b * root), 0.0, 0.0];
-            let mut h = [0.75 * cost / (b * b * root), 0.0, CURVATURE_MIN, 0.0, 0.0, CURVATURE_MIN];
-            for row in &mut rows[first..*end] {
-                row.slack += step * row.slack_step;
-                row.multiplier += step * row.multiplier_step;
-                row.residual = row.bound - row.along(&node.state, node.control) - row.slack;
-                residual = greater(residual, row.residual.abs());
-                let product = row.slack * row.multiplier;
-                total += product;
-                let inverse = 1.0 / product;
-                row.inverse = row.multiplier * inverse;
-                row.multiplier_inverse = row.slack * inverse;
-                row.weight = row.multiplier * row.inverse;
-                let pull = -row.weight * row.residual;
-                let [a0, a1, a2] = row.a;
-                force = [force[0] + pull * a0, force[1] + pull * a1, force[2] + pull * a2];
-                let (w0, w1) = (row.weight * a0, row.weight * a1);
-                h[0] += w0 * a0;
-                h[1] += w0 * a1;
-                h[2] += w1 * a1;
-                h[3] += w0 * a2;
-                h[4] += w1 * a2;
-                h[5] += row.weight * a2 * a2;
-            }
-            (node.hessian, node.force) = (h, force);
-            first = *end;
-        }
-        (total, residual)
+        let (total, missing) = advance_limits(&mut self.nodes, problem, step);
+        (total, greater(residual, missing))
     }
 
     /// Riccati recursion from the end.
@@ -393,107 +378,93 @@ impl Solver {
             problem.start_ray_ratio.map_or([0.0; 2], |ray| along_ray(ray, &self.nodes[0].value, &p));
     }
 
-    /// Steps of the control of node `i` and of the state after it.
-    fn step_on(&mut self, problem: &Problem, i: usize) {
-        let Some(transition) = problem.transitions.get(i) else {
-            self.nodes[i].control_step = 0.0;
-            return;
-        };
-        let node = &mut self.nodes[i];
-        let dx = node.state_step;
-        node.control_step = node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward;
-        let reached = transition.apply(&dx, node.control_step);
-        let gap = node.gap;
-        self.nodes[i + 1].state_step = [reached[0] + gap[0], reached[1] + gap[1]];
-    }
-
     /// The affine direction: how far it leads, and what it changes to second order.
     fn predict(&mut self, problem: &mut Problem) -> Prediction {
-        let mut prediction = Prediction::default();
-        let mut first = 0;
-        for i in 0..=problem.transitions.len() {
-            self.step_on(problem, i);
-            let node = &mut self.nodes[i];
-            let (mut inward, mut correction) = ([0.0; 3], [0.0; 3]);
-            for row in &mut problem.rows[first..problem.ends[i]] {
-                let slack_step = row.residual - row.along(&node.state_step, node.control_step);
-                let multiplier_step = -row.multiplier - row.weight * slack_step;
-                prediction.take(row, slack_step, multiplier_step);
-                row.correction = slack_step * multiplier_step;
-                let second = row.correction * row.inverse;
-                for ((inward, correction), a) in inward.iter_mut().zip(&mut correction).zip(row.a) {
-                    *inward += row.inverse * a;
-                    *correction += second * a;
-                }
-            }
-            (node.inward, node.correction) = (inward, correction);
-            first = problem.ends[i];
-        }
-        prediction
+        predict_limits(&mut self.nodes, problem)
     }
 
     /// The corrected direction: the steps at which the first slack and the first multiplier would vanish.
     fn correct(&mut self, problem: &mut Problem, centring: f64) -> (f64, f64) {
-        let (mut primal, mut dual) = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
-        let mut first = 0;
-        for i in 0..=problem.transitions.len() {
-            self.step_on(problem, i);
-            let node = &self.nodes[i];
-            for row in &mut problem.rows[first..problem.ends[i]] {
-                row.slack_step = row.residual - row.along(&node.state_step, node.control_step);
-                row.multiplier_step =
-                    (centring - row.correction) * row.inverse - row.multiplier - row.weight * row.slack_step;
-                primal = greater(primal, -row.slack_step * row.inverse);
-                dual = greater(dual, -row.multiplier_step * row.multiplier_inverse);
-            }
-            first = problem.ends[i];
+        let [primal, dual] = correct_limits(&mut self.nodes, problem, centring);
+        (1.0 / greater(f64::MIN_POSITIVE, primal), 1.0 / greater(f64::MIN_POSITIVE, dual))
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn advance_limits(nodes: &mut [Node], problem: &mut Problem, step: f64) -> (f64, f64) {
+    let Problem { blocks, ends, costs_ratio, .. } = problem;
+    let (mut total, mut residual) = ([0.0; LANES], [0.0; LANES]);
+    let mut first = 0;
+    for ((node, end), cost) in nodes.iter_mut().zip(ends.iter()).zip(costs_ratio.iter()) {
+        let mut sums = Sums::default();
+        for block in &mut blocks[first..*end] {
+            block.advance(step, &node.state, node.control, &mut sums, &mut total, &mut residual);
         }
-        (1.0 / primal, 1.0 / dual)
+        first = *end;
+        let b = node.state[0].max(f64::MIN_POSITIVE);
+        let root = b.sqrt();
+        let (force, h) = (sums.force(), sums.hessian());
+        node.force = [force[0] - 0.5 * cost / (b * root), force[1], force[2]];
+        node.hessian =
+            [h[0] + 0.75 * cost / (b * b * root), h[1], h[2] + CURVATURE_MIN, h[3], h[4], h[5] + CURVATURE_MIN];
     }
+    (sum(&total), residual.into_iter().fold(0.0, greater))
 }
 
-/// How far the affine direction leads, and the products of slacks and multipliers on the way.
-#[derive(Clone, Copy, Debug, Default)]
-struct Prediction {
-    /// Reciprocals of the steps at which the first slack and the first multiplier would vanish.
-    primal: f64,
-    dual: f64,
-    /// Sums of multiplier times slack step, slack times multiplier step, and of both steps.
-    by_slack: f64,
-    by_multiplier: f64,
-    by_both: f64,
+#[multiversion(targets("x86_64+avx2"))]
+fn predict_limits(nodes: &mut [Node], problem: &mut Problem) -> Prediction {
+    let Problem { blocks, ends, transitions, .. } = problem;
+    let mut prediction = Prediction::default();
+    let mut first = 0;
+    for i in 0..nodes.len() {
+        step_on(nodes, transitions, i);
+        let node = &mut nodes[i];
+        node.affine = [node.state_step[0], node.state_step[1], node.control_step];
+        let (mut inward, mut correction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        for block in &mut blocks[first..ends[i]] {
+            block.predict(&node.state_step, node.control_step, &mut prediction, &mut inward, &mut correction);
+        }
+        first = ends[i];
+        node.inward = inward.each_ref().map(sum);
+        node.correction = correction.each_ref().map(sum);
+    }
+    prediction
 }
 
-impl Prediction {
-    fn take(&mut self, row: &Row, slack_step: f64, multiplier_step: f64) {
-        let slack_share = slack_step * row.inverse;
-        self.primal = greater(self.primal, -slack_share);
-        // Here the multiplier's step is -multiplier - weight * slack step.
-        self.dual = greater(self.dual, 1.0 + slack_share);
-        self.by_slack += row.multiplier * slack_step;
-        self.by_multiplier += row.slack * multiplier_step;
-        self.by_both += slack_step * multiplier_step;
+#[multiversion(targets("x86_64+avx2"))]
+fn correct_limits(nodes: &mut [Node], problem: &mut Problem, centring: f64) -> [f64; 2] {
+    let Problem { blocks, ends, transitions, .. } = problem;
+    let (mut primal, mut dual) = ([0.0; LANES], [0.0; LANES]);
+    let mut first = 0;
+    for i in 0..nodes.len() {
+        step_on(nodes, transitions, i);
+        let node = &nodes[i];
+        let step = [node.state_step[0], node.state_step[1], node.control_step];
+        for block in &mut blocks[first..ends[i]] {
+            block.correct(&node.affine, &step, centring, &mut primal, &mut dual);
+        }
+        first = ends[i];
     }
-
-    /// The gap at the end of the longest step.
-    fn gap_after(&self, gap: f64) -> f64 {
-        let (primal, dual) = (1.0 / self.primal.max(1.0), 1.0 / self.dual.max(1.0));
-        gap + primal * self.by_slack + dual * self.by_multiplier + primal * dual * self.by_both
-    }
+    [primal, dual].map(|lanes| lanes.into_iter().fold(0.0, greater))
 }
 
-/// The greater of two numbers in one instruction: `f64::max` also looks for NaN, which the gap shows anyway.
-fn greater(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
-}
-
-impl Row {
-    fn along(&self, state: &[f64; 2], control: f64) -> f64 {
-        self.a[0] * state[0] + self.a[1] * state[1] + self.a[2] * control
-    }
+/// Steps of the control of node `i` and of the state after it.
+#[inline(always)]
+fn step_on(nodes: &mut [Node], transitions: &[Transition], i: usize) {
+    let Some(transition) = transitions.get(i) else {
+        nodes[i].control_step = 0.0;
+        return;
+    };
+    let node = &mut nodes[i];
+    let dx = node.state_step;
+    node.control_step = node.feedback[0] * dx[0] + node.feedback[1] * dx[1] + node.feedforward;
+    let reached = transition.apply(&dx, node.control_step);
+    let gap = node.gap;
+    nodes[i + 1].state_step = [reached[0] + gap[0], reached[1] + gap[1]];
 }
 
 impl Transition {
+    #[inline(always)]
     fn apply(&self, state: &[f64; 2], control: f64) -> [f64; 2] {
         let ([a00, a01, a10, a11], [b0, b1]) = (self.state_ratio, self.control_ratio);
         [a00 * state[0] + a01 * state[1] + b0 * control, a10 * state[0] + a11 * state[1] + b1 * control]

@@ -18,6 +18,7 @@ mod interval;
 mod interior_point;
 mod law;
 mod layout;
+mod limit_lanes;
 mod refuge;
 mod regime;
 mod rows;
