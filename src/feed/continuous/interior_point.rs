@@ -216,8 +216,8 @@ const STEP_SHARE: f64 = 0.99;
 /// Slack that a row starts with at least.
 const SLACK_START_MIN: f64 = 0.05;
 
-/// Limits and transitions are met to this.
-const RESIDUAL_MAX: f64 = 1e-10;
+/// Limits are met to this; the transitions to rounding, by a last step that nothing but them asks for.
+const RESIDUAL_MAX: f64 = 1e-6;
 
 /// Steps shorter than this, so many in a row, lead nowhere.
 const STALL_STEP: f64 = 0.2;
@@ -225,7 +225,6 @@ const STALLS_MAX: u32 = 2;
 
 /// What is good enough there.
 const STALLED_GAP_MAX_RATIO: f64 = 0.02;
-const STALLED_RESIDUAL_MAX: f64 = 1e-9;
 
 /// Added to the curvature where nothing else is.
 const CURVATURE_MIN: f64 = 1e-12;
@@ -263,6 +262,7 @@ impl Solver {
                 return Outcome::Failed;
             }
             if gap <= gap_max_ratio && residual <= RESIDUAL_MAX {
+                self.close(problem);
                 return Outcome::Solved;
             }
             self.factorise(problem);
@@ -274,9 +274,10 @@ impl Solver {
             let share = STEP_SHARE.max(1.0 - gap);
             step = (share * primal.min(dual)).min(1.0);
             // Where hardly anything is free the multipliers grow without bound, and the steps vanish: a point that keeps the limits will do.
-            let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= STALLED_RESIDUAL_MAX;
+            let usable = gap <= STALLED_GAP_MAX_RATIO && residual <= RESIDUAL_MAX;
             stalls = if usable && step < STALL_STEP { stalls + 1 } else { 0 };
             if stalls >= STALLS_MAX {
+                self.close(problem);
                 return Outcome::Solved;
             }
         }
@@ -313,6 +314,20 @@ impl Solver {
         }
         let (total, missing) = advance_limits(&mut self.nodes, problem, step);
         (total, greater(residual, missing))
+    }
+
+    /// Makes the states follow the transitions to rounding, with the least change in the metric of the limits at the present point.
+    fn close(&mut self, problem: &Problem) {
+        self.nodes.iter_mut().for_each(|node| node.force = [0.0; 3]);
+        self.factorise(problem);
+        self.backward(problem, None);
+        for i in 0..self.nodes.len() {
+            step_on(&mut self.nodes, &problem.transitions, i);
+            let node = &mut self.nodes[i];
+            node.state[0] += node.state_step[0];
+            node.state[1] += node.state_step[1];
+            node.control += node.control_step;
+        }
     }
 
     /// Riccati recursion from the end.

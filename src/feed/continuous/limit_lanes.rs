@@ -121,11 +121,6 @@ impl Block {
         }
     }
 
-    #[inline(always)]
-    fn along(&self, state: &[f64; 2], control: f64) -> Lanes {
-        each(|l| self.a[0][l] * state[0] + self.a[1][l] * state[1] + self.a[2][l] * control)
-    }
-
     /// Goes a step; then the products of slacks and multipliers, added to `total`, the greatest residuals, and what the limits add to force and
     /// Hessian of their node.
     #[inline(always)]
