@@ -63,8 +63,10 @@ pub(super) struct Profile {
     pub bends_per_s2: Vec<f64>,
 }
 
-/// Solutions within this share of the time are one.
+/// Of the time: how near to the fastest profile a solution is from which only the next tangents are taken, and one that is a plan. A speed that is held
+/// comes as near to its limit.
 const GAP_MAX_RATIO: f64 = 2e-4;
+const PLAN_GAP_MAX_RATIO: f64 = 1e-8;
 
 /// Rounds of tangents.
 const ROUNDS_MAX: u32 = 8;
@@ -163,11 +165,16 @@ impl Planning {
                 // A profile of earlier tangents obeys the true limits too: it is only slower.
                 return before.filter(|profile| tighten(chain, profile, &range, look));
             }
-            let profile = self.profile(chain, start);
+            let mut profile = self.profile(chain, start);
             if round + 1 < ROUNDS_MAX && self.strays(chain, &profile, &range) {
                 self.take_estimate(&profile, &range);
                 before = Some(profile);
                 continue;
+            }
+            let steps_max = self.steps_max();
+            self.solved = self.solver.refine(&mut self.problem, PLAN_GAP_MAX_RATIO, steps_max) == Outcome::Solved;
+            if self.solved {
+                profile = self.profile(chain, start);
             }
             if tighten(chain, &profile, &range, look) {
                 return Some(profile);
@@ -328,7 +335,7 @@ impl Planning {
             Start::At(_) if self.hurries => &LOOSER_RATIOS[2..],
             Start::At(_) => &LOOSER_RATIOS,
         };
-        let steps_max = if self.hurries { HURRIED_STEPS_MAX } else { STEPS_MAX };
+        let steps_max = self.steps_max();
         looser.iter().any(|by_ratio| {
             self.pose(chain, start);
             self.start_solver(chain, range);
@@ -336,6 +343,10 @@ impl Planning {
             self.problem.loosen(*by_ratio);
             self.solver.solve(&mut self.problem, GAP_MAX_RATIO, steps_max) == Outcome::Solved
         })
+    }
+
+    fn steps_max(&self) -> u32 {
+        if self.hurries { HURRIED_STEPS_MAX } else { STEPS_MAX }
     }
 
     /// A little below the estimate, with the slopes that it has.

@@ -253,8 +253,13 @@ impl Solver {
         if self.nodes.len() != problem.transitions.len() + 1 || problem.limits == 0 {
             return Outcome::Failed;
         }
+        self.first_slacks(problem);
+        self.refine(problem, gap_max_ratio, steps_max)
+    }
+
+    /// Goes on from a solution, to a better one.
+    pub fn refine(&mut self, problem: &mut Problem, gap_max_ratio: f64, steps_max: u32) -> Outcome {
         let count = problem.limits as f64;
-        self.first_slacks(problem, count);
         let (mut stalls, mut step) = (0, 0.0);
         for _ in 0..steps_max {
             let (gap, residual) = self.advance(problem, step);
@@ -284,8 +289,8 @@ impl Solver {
         Outcome::Failed
     }
 
-    fn first_slacks(&self, problem: &mut Problem, count: f64) {
-        let product = 3.0 * problem.costs_ratio.iter().sum::<f64>() / count;
+    fn first_slacks(&self, problem: &mut Problem) {
+        let product = 3.0 * problem.costs_ratio.iter().sum::<f64>() / problem.limits as f64;
         let Problem { blocks, ends, .. } = problem;
         let mut first = 0;
         for (node, end) in self.nodes.iter().zip(ends.iter()) {

@@ -104,6 +104,17 @@ impl Layout {
         self.uncut = self.uncut.min(self.chain.intervals.len());
     }
 
+    /// Intervals of a grid whose limits had to be tightened begin the next plan with that.
+    pub fn remember(&self, pieces: &mut [Piece<'_>]) {
+        for (index, interval) in self.chain.intervals.iter().enumerate().filter(|(_, interval)| interval.tightened) {
+            let Some(grid) = &mut pieces[self.owners[index]].flow.grid else { continue };
+            let at = grid.intervals.partition_point(|own| own.start_lu < interval.start_lu);
+            if let Some(own) = grid.intervals.get_mut(at).filter(|own| own.end_lu == interval.end_lu) {
+                (own.reserve_ratio, own.tightened) = (own.reserve_ratio.min(interval.reserve_ratio), true);
+            }
+        }
+    }
+
     /// The plan begins inside a piece: what its start allows is no matter.
     pub fn frees_start(&mut self) {
         if let Some(junction) = self.chain.junctions.first_mut() {

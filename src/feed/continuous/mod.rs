@@ -177,7 +177,8 @@ impl Continuous {
         let known = known.min(pieces.len().saturating_sub(1));
         let count = self.reach(pieces, known, start);
         let mut layout = self.layout(pieces, count, known, start);
-        let pieces = &pieces[..count];
+        let whole = pieces;
+        let pieces = &whole[..count];
         let settles = self.regime.settling_lu > 0.0;
         if settles {
             self.settle(&mut layout, pieces, self.regime.settling_lu);
@@ -188,6 +189,8 @@ impl Continuous {
             self.attempt(&mut layout, pieces, start)
         };
         let Some(mut profile) = planned else { return false };
+        layout.remember(&mut whole[..count]);
+        let pieces = &whole[..count];
         // Finer intervals would have the caps of their own again.
         if !settles {
             (layout, profile) = self.sharpened(layout, profile, pieces, start);
