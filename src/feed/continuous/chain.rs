@@ -77,6 +77,10 @@ const STRAY_MAX_SHARE: f64 = 0.12;
 /// Of a plan that ends in a stop which is not the program's, the last part is not kept: this many times the way from its last summit.
 const DISTURBED_RATIO: f64 = 1.6;
 
+/// A speed squared that differs by less is the same, and below this share of it the path is slower.
+const LEVEL_RATIO: f64 = 1.0 + 1e-6;
+const DIP_RATIO: f64 = 0.75;
+
 /// Attempts with tighter limits where those between the places do not hold.
 const ATTEMPTS_MAX: u32 = 8;
 
@@ -111,10 +115,19 @@ pub(super) struct Planning {
 }
 
 impl Profile {
-    /// The last border that is faster than the one before it.
+    /// The border where the path begins to brake for its end: before it the path is clearly slower again, or it is the fastest of all. Of a slow place just
+    /// before the end, which the end makes slower still, nothing says how fast the path could go through it.
     pub fn summit(&self) -> usize {
-        let speed = |index: usize| self.points[index].speed_squared_lu2_s2;
-        (1..self.points.len()).rev().find(|index| speed(index - 1) < speed(*index)).unwrap_or(0)
+        let b = |index: usize| self.points[index].speed_squared_lu2_s2;
+        let mut summit = self.points.len().saturating_sub(1);
+        for index in (0..summit).rev() {
+            if b(index) > LEVEL_RATIO * b(summit) {
+                summit = index;
+            } else if b(index) < DIP_RATIO * b(summit) {
+                break;
+            }
+        }
+        summit
     }
 
     /// How many intervals of a plan that ends in a stop in the middle of the path stay.
