@@ -30,7 +30,7 @@ const SHORTEST_S: f64 = 4e-5;
 
 /// Where so much of the time hangs on the limits of one interval, if they were wider by 1, it is put in parts once whatever first order says: its profile may
 /// be the best of its kind, and another kind faster that only shorter intervals can follow. Counted is this share of it.
-const HEAVY_PRICE: f64 = 0.01;
+const HEAVY_PRICE: f64 = 0.003;
 const HEAVY_SHARE: f64 = 0.1;
 
 /// A limit that another part of the interval would not need counts as so much wider there at most.
