@@ -42,8 +42,8 @@ pub(super) struct RunArguments {
     /// Go on behind the last set-point until every axis is in position; the set-point stands, and figures do not count it
     #[arg(long)]
     record_to_rest: bool,
-    /// Threads: 1 runs preparation inside the cycle; the result is the same
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
+    /// Threads: 1 runs everything in one, 2 the cycle beside its preparation, 3 the reading of the program as well; the result is the same
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
     /// One JSON document on stdout
     #[arg(long)]

@@ -37,8 +37,8 @@ pub(super) struct TimeArguments {
     /// What each machine datum costs: the time that 10 % more of it would save, and where it holds the motion back
     #[arg(long)]
     what_if: bool,
-    /// Threads: 1 runs preparation inside the cycle; the result is the same
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
+    /// Threads: 1 runs everything in one, 2 the cycle beside its preparation, 3 the reading of the program as well; the result is the same
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     threads: u16,
     /// One JSON document on stdout
     #[arg(long)]

@@ -14,6 +14,7 @@ mod follow;
 mod in_position;
 mod inner_rows;
 mod preparation;
+mod reading;
 mod record;
 mod run;
 mod setpoint_limits;

@@ -4,12 +4,13 @@
 //! planner, never in time, so that threads change nothing. An alarm of the interpreter or of feed stops preparation; everything before
 //! it is planned to rest and handed out first, as on the control.
 
+use super::reading::{Reader, Reading, Step};
 use crate::base::{Diagnostic, TimeBase};
 use crate::feed::{OverrideSchedule, PlannedPiece, Planner};
-use crate::interpreter::{Interpreter, MainRun, Move, MoveKind, Setup};
+use crate::interpreter::{MainRun, Move, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
-use crate::smoothing::{ContourPiece, Smoother};
+use crate::smoothing::{ContourPiece, OpenedPrograms};
 
 /// A path that ends this share of its time after a set-point ends on it, as for the interpolator.
 const SAME_TIME_RATIO: f64 = 1e-9;
@@ -39,9 +40,9 @@ pub struct Findings {
 
 /// Interpreter, smoothing, kinematics and feed in a row.
 #[derive(Clone)]
-pub struct Preparation {
-    interpreter: Interpreter,
-    smoother: Smoother,
+pub struct Preparation<R = Reading> {
+    reader: R,
+    opened: OpenedPrograms,
     kinematics: Kinematics,
     planner: Planner,
     warnings: Vec<Diagnostic>,
@@ -54,16 +55,14 @@ pub struct Preparation {
     stopped: bool,
     /// Time of all waits for the axes, as told.
     waited_s: f64,
-    /// What the interpreter made of the program since the last call of `take_moves`; `None`: not kept.
-    moves: Option<Vec<Move>>,
 }
 
 impl Preparation {
     /// At the start of `program`, axes at home.
     pub fn new(program: impl Into<Setup>, machine: &Machine) -> Self {
         Self {
-            interpreter: Interpreter::new(program, machine),
-            smoother: Smoother::new(machine),
+            reader: Reading::new(program, machine),
+            opened: OpenedPrograms::default(),
             kinematics: Kinematics::new(machine),
             planner: Planner::new(machine),
             warnings: Vec::new(),
@@ -73,10 +72,49 @@ impl Preparation {
             machine_drives: machine.axes.iter().any(|axis| axis.drive.is_some()),
             stopped: false,
             waited_s: 0.0,
-            moves: None,
         }
     }
 
+    /// With an `Event::Programmed` for every motion block: what the program asks of the path, for a recording.
+    pub fn telling_programmed(self) -> Self {
+        Self { reader: self.reader.telling_programmed(), ..self }
+    }
+
+    /// Keeps the moves, for those who want to plan them again.
+    pub(super) fn keeping_moves(self) -> Self {
+        Self { reader: self.reader.keeping_moves(), ..self }
+    }
+
+    /// The moves since the last call.
+    pub(super) fn take_moves(&mut self) -> Vec<Move> {
+        self.reader.take_moves()
+    }
+
+    /// The same, with the contour from somewhere else that `elsewhere` takes the reader to.
+    pub(super) fn reading_from<R, E>(
+        self,
+        elsewhere: impl FnOnce(Reading) -> Result<R, E>,
+    ) -> Result<Preparation<R>, E> {
+        let Self { reader, opened, kinematics, planner, warnings, alarm, finished, .. } = self;
+        let Self { time_base, machine_drives, stopped, waited_s, .. } = self;
+        let reader = elsewhere(reader)?;
+        Ok(Preparation {
+            reader,
+            opened,
+            kinematics,
+            planner,
+            warnings,
+            alarm,
+            finished,
+            time_base,
+            machine_drives,
+            stopped,
+            waited_s,
+        })
+    }
+}
+
+impl<R: Reader> Preparation<R> {
     /// With changes of the feed override at run time.
     pub fn with_overrides(self, schedule: &OverrideSchedule) -> Self {
         Self { planner: self.planner.with_overrides(schedule), ..self }
@@ -88,52 +126,26 @@ impl Preparation {
         Self { planner: self.planner.waiting_in_position(driven), ..self }
     }
 
-    /// With an `Event::Programmed` for every motion block: what the program asks of the path, for a recording.
-    pub fn telling_programmed(self) -> Self {
-        Self { smoother: self.smoother.telling_programmed(), ..self }
-    }
-
-    /// Keeps the moves, for those who want to plan them again.
-    pub(super) fn keeping_moves(self) -> Self {
-        Self { moves: Some(Vec::new()), ..self }
-    }
-
-    /// The moves since the last call.
-    pub(super) fn take_moves(&mut self) -> Vec<Move> {
-        self.moves.as_mut().map(std::mem::take).unwrap_or_default()
-    }
-
     /// Executes one more block of the program and plans what follows from it.
     fn extend(&mut self) {
-        let moved = self.interpreter.next_move();
-        self.stopped = matches!(&moved, Ok(Some(next)) if next.kind == MoveKind::StopPreparation);
-        if let (Some(moves), Ok(Some(next))) = (&mut self.moves, &moved) {
-            moves.push(next.clone());
-        }
-        let Self { smoother, kinematics, planner, .. } = self;
+        let Self { reader, opened, kinematics, planner, .. } = self;
         let mut refused = None;
         let mut plan = |piece: ContourPiece| {
             // Nothing may follow a piece that was refused: the axes would jump over it.
             if refused.is_none() {
+                opened.watch(&piece.events);
                 let block = piece.block;
                 refused = planner.push(kinematics.to_joint(piece)).err().map(|alarm| (block, alarm));
             }
         };
-        match moved {
-            Ok(Some(next)) => smoother.push(next, &mut plan),
-            ended => {
-                self.alarm = ended.err().map(|alarm| *alarm);
-                self.finished = true;
-                smoother.finish(&mut plan);
-            }
-        }
+        let Step { warnings, alarm, ends, stops } = reader.step(&mut plan);
+        (self.alarm, self.finished, self.stopped) = (alarm, ends, stops);
         if let Some((block, alarm)) = refused {
             // It stands before any alarm of the interpreter, which is ahead.
-            self.alarm = Some(self.smoother.marked(*alarm, block));
+            self.alarm = Some(self.opened.marked(*alarm, block));
             self.finished = true;
         }
-        self.warnings.extend(self.interpreter.take_warnings());
-        self.warnings.extend(self.smoother.take_warnings());
+        self.warnings.extend(warnings);
         if self.finished {
             self.planner.finish();
         }
@@ -158,7 +170,7 @@ impl Preparation {
         loop {
             if let Some(piece) = self.planner.pop() {
                 if let Some((block, alarm)) = self.planner.take_alarm() {
-                    self.alarm = Some(self.smoother.marked(alarm, block));
+                    self.alarm = Some(self.opened.marked(alarm, block));
                     self.finished = true;
                     self.planner.finish();
                 }
@@ -169,7 +181,7 @@ impl Preparation {
             }
             if self.finished {
                 while let Some((block, warning)) = self.planner.take_warning() {
-                    self.warnings.push(self.smoother.marked(warning, block));
+                    self.warnings.push(self.opened.marked(warning, block));
                 }
                 return None;
             }
@@ -191,11 +203,11 @@ impl Preparation {
             return self.planner.tell_waited(self.waited_s);
         }
         self.stopped = false;
-        self.interpreter.tell_main_run(self.main_run());
+        self.reader.tell_main_run(self.main_run());
     }
 }
 
-impl PieceSource for Preparation {
+impl<R: Reader> PieceSource for Preparation<R> {
     fn next_piece(&mut self) -> Option<PlannedPiece> {
         loop {
             match self.piece_ahead() {

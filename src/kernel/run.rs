@@ -1,13 +1,13 @@
 //! The loop around the kernel: threads, recording, pace, progress.
 //!
-//! In: [`RunOptions`]. Out: [`RunOutcome`]; the recording on the disk. Three stages, joined by bounded channels: preparation | cycle |
-//! recorder. `threads` = 1 runs preparation inside the cycle; the result is the same to the byte. Does not print.
+//! In: [`RunOptions`]. Out: [`RunOutcome`]; the recording on the disk. Stages, joined by bounded channels: reading | preparation | cycle |
+//! recorder. `threads` = 1 runs reading and preparation inside the cycle; the result is the same to the byte. Does not print.
 
 use super::cycle::{Kernel, Status};
 use super::preparation::{PieceSource, Preparation};
 use super::record::{record_alarm, record_braking, record_cycle};
 use super::summary::{RunSummary, drive_warnings};
-use super::threads::PreparationThread;
+use super::threads::{PreparationThread, ReadingThread};
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, Tick};
 use crate::feed::OverrideSchedule;
@@ -35,7 +35,7 @@ pub struct RunOptions<'a> {
     pub mantissa_bits: Option<u8>,
     /// Signals to record.
     pub signals: SignalChoice,
-    /// 1: preparation in the cycle's thread; more: in one of its own.
+    /// 1: preparation in the cycle's thread; 2: in one of its own; more: the reading of the program in another one.
     pub threads: usize,
     /// Simulated seconds per second of the wall clock; `None`: as fast as possible.
     pub pace_ratio: Option<f64>,
@@ -95,7 +95,12 @@ pub fn run(options: RunOptions<'_>, progress: &mut dyn FnMut(Progress)) -> Resul
         .waiting_in_position(options.drives);
     let preparation = if options.recording.is_some() { preparation.telling_programmed() } else { preparation };
     if options.threads > 1 {
-        let source = PreparationThread::spawn(preparation)
+        let spawned = if options.threads > 2 {
+            preparation.reading_from(ReadingThread::spawn).and_then(PreparationThread::spawn)
+        } else {
+            PreparationThread::spawn(preparation)
+        };
+        let source = spawned
             .map_err(|error| RunError(Diagnostic::error("K0001", format!("no thread for preparation: {error}"))))?;
         let kernel = Kernel::with_source(machine, source, options.drives).asked_for(&options.signals);
         drive_loop(kernel, options, progress)

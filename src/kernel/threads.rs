@@ -1,12 +1,16 @@
-//! Preparation on a thread of its own, joined to the cycle by a bounded channel of batches.
+//! Preparation on a thread of its own, and the reading of the program on another one, joined to each other and to the cycle by bounded channels of
+//! batches.
 //!
-//! In: a [`Preparation`]. Out: a [`PieceSource`] that gives the same pieces in the same order. The channel's length only decides how
-//! much memory is used and who waits: what is planned does not depend on it. Where the program asks for the time of the main run
-//! (STOPRE), the thread waits until the cycle has come there and has told how long block ends waited.
+//! In: a [`Preparation`], a [`Reading`]. Out: a [`PieceSource`] and a [`Reader`] that give the same pieces in the same order. The length of a channel only
+//! decides how much memory is used and who waits: what is planned does not depend on it. Where the program asks for the time of the main run
+//! (STOPRE), both threads wait until the cycle has come there and has told how long block ends waited.
 
 use super::preparation::{Findings, PieceSource, Preparation};
+use super::reading::{Reader, Reading, Step};
 use crate::base::Diagnostic;
 use crate::feed::PlannedPiece;
+use crate::interpreter::MainRun;
+use crate::smoothing::ContourPiece;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::collections::VecDeque;
 use std::thread::JoinHandle;
@@ -37,7 +41,7 @@ pub(super) struct PreparationThread {
 
 impl PreparationThread {
     /// Moves `preparation` to a new thread. Errors if the system gives no thread.
-    pub(super) fn spawn(mut preparation: Preparation) -> std::io::Result<Self> {
+    pub(super) fn spawn<R: Reader + Send + 'static>(mut preparation: Preparation<R>) -> std::io::Result<Self> {
         let (send, messages) = bounded(BATCHES);
         let (answers, told) = bounded(1);
         let worker = std::thread::Builder::new().name("preparation".into()).spawn(move || {
@@ -92,11 +96,7 @@ impl PieceSource for PreparationThread {
                     self.messages = None;
                 }
                 Err(_) => {
-                    // The thread is gone without its findings: half a program must not look like a whole one.
-                    let message =
-                        "preparation broke down: the run ends here, and its figures are not those of the program";
-                    let alarm = Diagnostic::error("K0005", message).help("please report this, with the program");
-                    self.findings.alarm = Some(alarm);
+                    self.findings.alarm = Some(broke_down());
                     self.messages = None;
                 }
             }
@@ -120,6 +120,96 @@ impl Drop for PreparationThread {
         (self.messages, self.answers) = (None, None);
         if let Some(worker) = self.worker.take() {
             // A panic in preparation was printed by its own thread; here it must not become a second one.
+            let _ = worker.join();
+        }
+    }
+}
+
+/// A thread is gone without its findings: half a program must not look like a whole one.
+fn broke_down() -> Diagnostic {
+    let message = "preparation broke down: the run ends here, and its figures are not those of the program";
+    Diagnostic::error("K0005", message).help("please report this, with the program")
+}
+
+/// Blocks a message.
+const BATCH_STEPS: usize = 64;
+
+/// Blocks in order: how many of the pieces are theirs, and what they had to say, if anything.
+#[derive(Default)]
+struct Blocks {
+    pieces: Vec<ContourPiece>,
+    steps: Vec<(usize, Option<Box<Step>>)>,
+}
+
+/// The receiving end of a reader.
+pub(super) struct ReadingThread {
+    blocks: Option<Receiver<Blocks>>,
+    pieces: std::vec::IntoIter<ContourPiece>,
+    steps: std::vec::IntoIter<(usize, Option<Box<Step>>)>,
+    answers: Option<Sender<MainRun>>,
+    worker: Option<JoinHandle<()>>,
+}
+
+impl ReadingThread {
+    /// Moves `reading` to a new thread. Errors if the system gives no thread.
+    pub(super) fn spawn(mut reading: Reading) -> std::io::Result<Self> {
+        let (send, blocks) = bounded(BATCHES);
+        let (answers, told) = bounded(1);
+        let worker = std::thread::Builder::new().name("reading".into()).spawn(move || {
+            loop {
+                let mut batch = Blocks::default();
+                let (mut stops, mut ends) = (false, false);
+                while batch.steps.len() < BATCH_STEPS && !stops && !ends {
+                    let known = batch.pieces.len();
+                    let step = reading.step(&mut |piece| batch.pieces.push(piece));
+                    (stops, ends) = (step.stops, step.ends);
+                    batch.steps.push((batch.pieces.len() - known, (!step.is_plain()).then(|| Box::new(step))));
+                }
+                // A closed channel means that preparation has given up.
+                if send.send(batch).is_err() || ends {
+                    return;
+                }
+                if stops {
+                    let Ok(main_run) = told.recv() else { return };
+                    reading.tell_main_run(main_run);
+                }
+            }
+        })?;
+        Ok(Self {
+            blocks: Some(blocks),
+            pieces: Vec::new().into_iter(),
+            steps: Vec::new().into_iter(),
+            answers: Some(answers),
+            worker: Some(worker),
+        })
+    }
+}
+
+impl Reader for ReadingThread {
+    fn step(&mut self, piece: &mut impl FnMut(ContourPiece)) -> Step {
+        loop {
+            if let Some((count, step)) = self.steps.next() {
+                self.pieces.by_ref().take(count).for_each(piece);
+                return step.map(|step| *step).unwrap_or_default();
+            }
+            match self.blocks.as_ref().and_then(|blocks| blocks.recv().ok()) {
+                Some(next) => (self.pieces, self.steps) = (next.pieces.into_iter(), next.steps.into_iter()),
+                None => return Step { alarm: Some(broke_down()), ends: true, ..Step::default() },
+            }
+        }
+    }
+
+    fn tell_main_run(&mut self, main_run: MainRun) {
+        // A thread that is gone is noticed at the next step.
+        let _ = self.answers.as_ref().map(|answers| answers.send(main_run));
+    }
+}
+
+impl Drop for ReadingThread {
+    fn drop(&mut self) {
+        (self.blocks, self.answers) = (None, None);
+        if let Some(worker) = self.worker.take() {
+            // A panic was printed by its own thread; here it must not become a second one.
             let _ = worker.join();
         }
     }

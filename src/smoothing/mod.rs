@@ -6,11 +6,13 @@ mod compressor;
 mod corner;
 mod dynamics;
 mod insert;
+mod opened;
 mod programmed;
 mod smoother;
 mod transition;
 mod unrounded;
 mod wire;
 
+pub use opened::OpenedPrograms;
 pub use smoother::Smoother;
 pub use wire::*;

@@ -17,7 +17,6 @@ use super::insert::{Inserted, Omitted, inserted};
 use super::programmed::{positioned, programmed};
 use super::unrounded::{Reason, Unrounded};
 use super::{ContourPiece, PieceKind};
-use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, PartPoint, PerAxis};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, PolynomialCurve, SpatialArc};
 use crate::interpreter::{AxisPositioning, CornerInsert, Event, Feed, Modes, Move, MoveKind, Positioning};
@@ -207,14 +206,6 @@ impl Smoother {
     /// Findings since the last call.
     pub fn take_warnings(&mut self) -> Vec<Diagnostic> {
         self.unrounded.take()
-    }
-
-    /// An alarm of a later stage, with the line of its block marked.
-    pub fn marked(&self, alarm: Diagnostic, block: BlockRef) -> Diagnostic {
-        match self.unrounded.place(block) {
-            Some(place) => alarm.at(Place { label: "this motion".to_owned(), ..place }),
-            None => alarm,
-        }
     }
 
     fn push_motion(&mut self, mut next: Move, curve: Curve, out: &mut impl FnMut(ContourPiece)) {

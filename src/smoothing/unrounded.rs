@@ -3,10 +3,10 @@
 //! In: program files as they are opened, blocks that end in such a corner. Out: one warning a reason, with the line marked. Does
 //! not change the contour.
 
+use super::OpenedPrograms;
 use crate::base::Diagnostic;
-use crate::base::diagnostics::Place;
 use crate::interpreter::Event;
-use crate::program::{BlockRef, OpenedProgram, ProgramSource};
+use crate::program::BlockRef;
 
 /// What the program asks for and does not get.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,7 @@ pub(super) enum Reason {
 /// Warnings not yet taken, and what has been said.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Unrounded {
-    programs: Vec<OpenedProgram>,
+    opened: OpenedPrograms,
     said: Vec<Reason>,
     warnings: Vec<Diagnostic>,
 }
@@ -30,11 +30,7 @@ pub(super) struct Unrounded {
 impl Unrounded {
     /// Remembers the texts that warnings will quote.
     pub(super) fn watch(&mut self, events: &[Event]) {
-        for event in events {
-            if let Event::ProgramOpened(program) = event {
-                self.programs.push(program.clone());
-            }
-        }
+        self.opened.watch(events);
     }
 
     /// A corner at the end of `block` is passed as in G64.
@@ -62,7 +58,7 @@ impl Unrounded {
         };
         let message = format!("the corner at the end of line {} {what}", block.line);
         let warning = Diagnostic::warning(code, message).help(help);
-        self.warnings.push(match self.place(block) {
+        self.warnings.push(match self.opened.place(block) {
             Some(place) => warning.at(place),
             None => warning,
         });
@@ -71,14 +67,5 @@ impl Unrounded {
     /// Warnings since the last call.
     pub(super) fn take(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.warnings)
-    }
-
-    /// The line of a block, marked.
-    pub(super) fn place(&self, block: BlockRef) -> Option<Place> {
-        let program = self.programs.iter().rev().find(|program| program.id == block.program)?;
-        let source = ProgramSource::from_bytes(&program.name, program.bytes.clone());
-        let line_text = source.text_of_line(block.line)?.trim_end().to_owned();
-        let columns = 0..line_text.len();
-        Some(Place { file: program.name.clone(), line: block.line, line_text, columns, label: "ends here".to_owned() })
     }
 }

@@ -99,7 +99,7 @@ fn recordings_are_equal_to_the_byte_on_any_number_of_threads() {
         let bytes = std::fs::read(&one).unwrap();
         for repeat in 0..3 {
             let many = scratch(&format!("{name}_many_{repeat}.mcap"));
-            record(PROGRAM, &loaded, 2, &many);
+            record(PROGRAM, &loaded, 2 + repeat % 2, &many);
             assert!(std::fs::read(&many).unwrap() == bytes, "{name}: repeat {repeat} differs");
         }
     }
@@ -119,7 +119,7 @@ fn an_unstable_drive_ends_the_run_with_an_alarm_and_a_whole_recording() {
     let loaded = machine("spinner_mvc850", &sets);
     let text = format!("CYCLE800()\n{}CYCLE832(0.1,1,1)\nM30\n", "G1 X1 F1000\nX0\n".repeat(300));
     let mut recordings = Vec::new();
-    for threads in [1, 2, 2] {
+    for threads in [1, 2, 3, 3] {
         let path = scratch(&format!("unstable_{threads}.mcap"));
         let outcome = record(&text, &loaded, threads, &path);
         let alarm = outcome.alarm.expect("the axis has left all bounds");
@@ -167,7 +167,7 @@ fn the_control_stops_an_axis_that_leaves_its_model_and_the_recording_goes_up_to_
     for (name, sets) in [("weak", weak), ("unstable", unstable)] {
         let loaded = machine("spinner_mvc850", &sets);
         let mut recordings = Vec::new();
-        for threads in [1, 2] {
+        for threads in [1, 2, 3] {
             let path = scratch(&format!("contour_{name}_{threads}.mcap"));
             let outcome = record("G642\nG0 X150\nG1 X100 F5000\nG0 X0\nM30\n", &loaded, threads, &path);
             let alarm = outcome.alarm.expect("an alarm");
@@ -314,7 +314,7 @@ fn a_change_of_the_override_comes_at_its_time_behind_waits() {
     let loaded = machine("spinner_mvc850", &sets);
     let text = "G60 G1 X10 F6000\nX0\nX10\nG64 X300 F3000\nM30\n";
     let mut recordings = Vec::new();
-    for threads in [1, 2] {
+    for threads in [1, 2, 3] {
         let path = scratch(&format!("override_wait_{threads}.mcap"));
         let options = RunOptions {
             machine: &loaded,
@@ -356,7 +356,7 @@ fn the_time_that_a_program_reads_includes_the_waits() {
     let loaded = machine("spinner_mvc850", &sets);
     let text = "G60 G1 X30 F6000\nX0\nX20\nSTOPRE\nR1=$AC_ACT_PROG_NET_TIME\nMSG(\"T\"<<R1)\nG1 X0\nX10\nR2=$AC_ACT_PROG_NET_TIME\nMSG(\"T\"<<R2)\nX0\nM30\n";
     let mut recordings = Vec::new();
-    for threads in [1, 2, 2] {
+    for threads in [1, 2, 3, 3] {
         let path = scratch(&format!("main_run_{threads}.mcap"));
         let outcome = record(text, &loaded, threads, &path);
         assert!(outcome.alarm.is_none(), "{:?}", outcome.alarm);
@@ -404,7 +404,7 @@ fn a_change_of_the_override_is_the_same_on_any_number_of_threads_and_on_record()
     // Without the wait for the spindle, or nothing moves yet when the override changes.
     let loaded = machine("spinner_mvc850", &["feed.time_law=continuous", "spindle.feed_starts_at_once=true"]);
     let mut recordings = Vec::new();
-    for threads in [1, 2, 2] {
+    for threads in [1, 2, 3, 3] {
         let path = scratch(&format!("override_{threads}.mcap"));
         let overrides = OverrideSchedule::parse("0.5=40,0.9=0,1.3=130").unwrap();
         let outcome = run(
