@@ -81,7 +81,7 @@ fn the_feed_follows_the_spindle_up_from_the_edge_of_its_tolerance() {
         assert!(ramping > 450, "{law}: {ramping}");
         for (t, lead_mm) in &leads {
             // Half a stretch of 0.8 %, and a little for the change from stretch to stretch.
-            assert!((lead_mm / 0.3 - 1.0).abs() < 0.005, "{law}: {t} s: {lead_mm}");
+            assert!((lead_mm / 0.3 - 1.0).abs() < 0.006, "{law}: {t} s: {lead_mm}");
         }
         // At full speed it is exact, to what the optimiser of `continuous` leaves of its feed.
         let (t, lead_mm) = leads[leads.len() - 1];
