@@ -123,6 +123,11 @@ impl Blocks {
         Some(Solution { theta, without, stretches, condition, rms })
     }
 
+    /// Sum of squares of the response.
+    pub(super) fn response_square(&self) -> f64 {
+        self.blocks.iter().map(|block| block.square).sum()
+    }
+
     /// Sum of squares of the residuals of given values on some columns.
     pub(super) fn residual_square(&self, columns: &[usize], theta: &DVector<f64>) -> f64 {
         self.blocks
