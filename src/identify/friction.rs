@@ -28,14 +28,18 @@ const GS: usize = 4;
 const GC: usize = 5;
 const SHIFT: usize = 6;
 pub(super) const SPRING: usize = 7;
-pub(super) const STRIBECK: [usize; 3] = [8, 9, 10];
+pub(super) const STRIBECK: [usize; 4] = [8, 9, 10, 14];
 pub(super) const SQUARE: usize = 11;
 pub(super) const ONE_SIDED: usize = 12;
 const PLACE: usize = 13;
-const WIDTH: usize = 14;
+const WIDTH: usize = 15;
 
-/// Speeds of the Stribeck terms, as shares of the highest.
-const STRIBECK_SHARES: [f64; 3] = [0.02, 0.05, 0.15];
+/// Speeds of the Stribeck terms, as shares of the highest: friction that falls over more than a third of the speeds is bent, and no more told from a viscous one.
+const STRIBECK_SHARES: [f64; 4] = [0.02, 0.05, 0.15, 0.3];
+/// Shift of a value by terms beside the law from which the simulated axis, which has the same law, is not held against the trace.
+const MISFIT_SHARE: f64 = 0.1;
+/// Share of what looks like acceleration that may be the quantum of the scale, and how well that share is known.
+const QUANTUM_SHARE: (f64, f64) = (0.25, 0.25);
 /// Share of the highest torque that is next to none.
 const NEAR_NONE_SHARE: f64 = 0.02;
 /// Share of the torque that a law may leave over.
@@ -79,6 +83,8 @@ impl Mechanics {
 struct Covered {
     blocks: Blocks,
     speed_max_rad_s: f64,
+    /// Sum of squares that the quantum of the scale adds to the accelerations.
+    quantum_square: f64,
     torque_max_n_m: f64,
     /// Time of motion forward and backward.
     direction_s: [f64; 2],
@@ -104,6 +110,7 @@ fn covered(motions: &[Motion]) -> Covered {
     let mut all = Covered {
         blocks: Blocks::new(WIDTH),
         speed_max_rad_s,
+        quantum_square: 0.0,
         torque_max_n_m: 0.0,
         direction_s: [0.0; 2],
         range_lu: 0.0,
@@ -120,6 +127,7 @@ fn covered(motions: &[Motion]) -> Covered {
                 continue;
             }
             all.blocks.push_in(k / per_block, &row, motion.torque_n_m[k]);
+            all.quantum_square += motion.quantum_rad2_s4;
             all.torque_max_n_m = all.torque_max_n_m.max(motion.torque_n_m[k].abs());
             all.direction_s[usize::from(row[TC] < 0.0)] += motion.period_s;
             if row[J].abs() < CONSTANT_SHARE * acceleration_max_rad_s2 {
@@ -155,6 +163,7 @@ fn row(motion: &Motion, k: usize, speed_max_rad_s: f64) -> [f64; WIDTH] {
         w * w.abs(),
         w.abs(),
         motion.position_lu[k],
+        stribeck(STRIBECK_SHARES[3]),
     ]
 }
 
@@ -171,9 +180,19 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult)
     (found.condition, found.rms_n_m) = (solution.condition, solution.rms);
     let beyond = beyond(&all.blocks, &columns, &solution, &mut result.verdicts);
     let moved = |place: usize| {
-        matches!(columns[place], J | B | TC) && beyond.shifts[place] > 0.02 * solution.theta[place].abs()
+        matches!(columns[place], J | B | TC) && beyond.shifts[place] > MISFIT_SHARE * solution.theta[place].abs()
     };
     found.misfit = (0..columns.len()).any(moved);
+    if beyond.open {
+        let reason = "friction falls over a third of the speeds and more: what is constant and what grows with speed is not told apart";
+        for parameter in [Parameter::Viscous, Parameter::Coulomb] {
+            result.refuse(
+                parameter,
+                reason,
+                "record more constant speeds, up to the highest (`sollwert identify --plan`)",
+            );
+        }
+    }
     for (place, column) in columns.iter().enumerate() {
         let Some(parameter) = parameter_of(*column, both).filter(|parameter| result.refusal(*parameter).is_none())
         else {
@@ -189,6 +208,21 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult)
         if parameter == Parameter::Viscous && estimate.value < 0.0 && estimate.high >= 0.0 {
             // No friction drives an axis.
             estimate.value = 0.0;
+        }
+        if parameter == Parameter::Inertia {
+            // Noise of the scale in the acceleration makes a slope too small, by its share of what the column has of its own.
+            let share = (all.quantum_square / solution.own_square[place]).min(1.0);
+            if share > QUANTUM_SHARE.0 {
+                let percent = percent_from_ratio(share);
+                let reason = format!("{percent:.0} % of what looks like acceleration is the quantum of the scale");
+                result.refuse(
+                    parameter,
+                    reason,
+                    "record jerk-limited moves at the highest acceleration (`sollwert identify --plan`)",
+                );
+                continue;
+            }
+            estimate = estimate.scaled(1.0 / (1.0 - share)).widened(QUANTUM_SHARE.1 * share * value.abs());
         }
         match verdict(&estimate, &all, solution.stretches[place], found.value(Parameter::Coulomb)) {
             None => found.estimates.push(estimate),

@@ -7,13 +7,14 @@
 //! r = [(τ - τ_sim)/σ_τ, (x - x_sim - zero)/σ_x]        J, B, Tc, g0 and, if no trace told them, Kp and Tn are free
 //! ```
 //! both behind the window of `motion`.
-//! The quantum of the scale is in the model, derivatives are differences over 2 % (a smaller step only sees which quantum is hit; gains of the speed loop: 10 % to each side), and kvff and
+//! The quantum of the scale is in the model, derivatives are differences over 2 %, simulated without it (with it they
+//! show which quantum is hit, and the fit stops a tenth away from the gains of the speed loop), and kvff and
 //! d_pos are never free together: both come from the recorded wires or from the machine file. Where the simulated axis leaves clearly more
 //! over than the law of `friction`, its controllers are not those of the machine, and least squares stay.
 
 use super::feedforward::left_out;
 use super::friction::Mechanics;
-use super::motion::{filtered, half_window_rows, window};
+use super::motion::{filtered, half_window_rows, quantum, window};
 use super::normal::{Blocks, Solution};
 use super::record::AxisRecord;
 use super::wire::{AxisResult, Estimate, Means, Parameter, TorqueSource};
@@ -24,9 +25,6 @@ use crate::machine::{Axis, DriveData, Machine};
 
 /// Relative step of the differences.
 const STEP_SHARE: f64 = 0.02;
-/// The same for a gain of the speed loop: in less of a change of it the quanta of the scale that are hit otherwise are most of what is seen, the derivative
-/// is wrong, and the fit stops a tenth away.
-const GAIN_STEP_SHARE: f64 = 0.1;
 /// Passes at most.
 const PASSES: usize = 12;
 /// Share of its interval that a value may still have to go.
@@ -57,7 +55,6 @@ struct Problem<'a> {
 }
 
 /// Residuals of one record: torque in N m, position in lu.
-#[derive(Clone)]
 struct Residuals {
     torque: Vec<f64>,
     position: Vec<f64>,
@@ -212,18 +209,6 @@ fn set(data: &mut DriveData, values: &[(Parameter, f64)]) {
     }
 }
 
-/// The step of a scale, if the positions stand on one.
-fn quantum(position: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = position.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|s| *s > 1e-9).collect();
-    steps.sort_by(f64::total_cmp);
-    let least = *steps.get(steps.len() / 100)?;
-    let near =
-        |step: &&f64| ((**step / least) - (**step / least).round()).abs() < 0.01 * (**step / least).max(1.0).sqrt();
-    let whole = steps.iter().filter(|step| **step < 50.0 * least).filter(near).count();
-    let looked_at = steps.iter().filter(|step| **step < 50.0 * least).count();
-    (looked_at > 20 && whole as f64 > 0.98 * looked_at as f64 && least > 1e-7).then_some(least)
-}
-
 impl Problem<'_> {
     /// Simulates all records; `None` where the axis leaves all bounds.
     fn residuals(&self, data: &DriveData) -> Option<Vec<Residuals>> {
@@ -280,6 +265,9 @@ impl Problem<'_> {
 
     /// Normal equations at the present values.
     fn linearised(&self, base: &[Residuals], sizes: (f64, f64)) -> Option<Blocks> {
+        let mut smooth = self.data.clone();
+        smooth.encoder.position_resolution_lu = 0.0;
+        let ideal = self.residuals(&smooth)?;
         let mut columns = Vec::new();
         for parameter in &self.free {
             let value = get(&self.data, *parameter);
@@ -287,19 +275,10 @@ impl Problem<'_> {
                 Parameter::Gravity | Parameter::Viscous => STEP_SHARE * self.small(*parameter),
                 _ => 0.0,
             };
-            let is_gain = matches!(parameter, Parameter::SpeedGain | Parameter::SpeedResetTime);
-            let step = (if is_gain { GAIN_STEP_SHARE } else { STEP_SHARE } * value.abs()).max(floor);
-            let at = |value: f64| {
-                let mut moved = self.data.clone();
-                set(&mut moved, &[(*parameter, value)]);
-                self.residuals(&moved)
-            };
-            // Over so much a gain is not straight: from below to above.
-            if is_gain {
-                columns.push((2.0 * step, at(value - step)?, at(value + step)?));
-            } else {
-                columns.push((step, base.to_vec(), at(value + step)?));
-            }
+            let step = (STEP_SHARE * value.abs()).max(floor);
+            let mut moved = smooth.clone();
+            set(&mut moved, &[(*parameter, value + step)]);
+            columns.push((step, self.residuals(&moved)?));
         }
         let mut blocks = Blocks::new(self.free.len());
         for (place, record) in self.records.iter().enumerate() {
@@ -307,8 +286,8 @@ impl Problem<'_> {
             for k in 0..record.count {
                 let mut push = |of: fn(&Residuals) -> &Vec<f64>, size: f64| {
                     let y = of(&base[place])[k] / size;
-                    let slope = |(step, from, to): &(f64, Vec<Residuals>, Vec<Residuals>)| {
-                        (of(&from[place])[k] - of(&to[place])[k]) / step / size
+                    let slope = |(step, moved): &(f64, Vec<Residuals>)| {
+                        (of(&ideal[place])[k] - of(&moved[place])[k]) / step / size
                     };
                     let row: Vec<f64> = columns.iter().map(slope).collect();
                     if y.is_finite() && row.iter().all(|value| value.is_finite()) {
@@ -394,7 +373,7 @@ impl Problem<'_> {
             let room = start.room.iter().find(|(known, _)| known == parameter).map_or([0.0; 2], |(_, room)| *room);
             let estimate = Estimate::around(*parameter, value, half, Means::OutputError).reaching(room);
             match (parameter, first) {
-                (_, Some(first)) if estimate.half() > first.half() => found.push(*first),
+                (_, Some(first)) if half > first.half() => found.push(*first),
                 (Parameter::SpeedGain | Parameter::SpeedResetTime, _) => {
                     if half <= GAIN_SHARE * value {
                         found.push(estimate);

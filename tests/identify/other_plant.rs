@@ -118,7 +118,7 @@ fn the_strangers_are_those_that_the_script_drew() {
 
 /// Given and held by the interval, of all plants: inertia, viscous, Coulomb.
 fn counted(plants: usize) -> [(usize, usize); 3] {
-    let (mut counts, mut far) = ([(0, 0); 3], Vec::new());
+    let (mut counts, mut missed) = ([(0, 0); 3], Vec::new());
     for (seed, (plant, scale)) in drawn().into_iter().take(plants).enumerate() {
         let result = found(plant.trace(&setpoint(scale), Some(seed as u64)), true);
         for ((parameter, truth), (given, inside)) in truth(&plant).into_iter().zip(&mut counts) {
@@ -135,7 +135,7 @@ fn counted(plants: usize) -> [(usize, usize); 3] {
             let most = if parameter == Parameter::Viscous { 0.05 } else { 0.01 };
             let said = || format!("plant {seed}, {plant:?}: {estimate:?} misses {truth} by {beyond:.3} of it");
             if beyond > most {
-                far.push(said());
+                missed.push(said());
             }
             if !holds && std::env::var("VERBOSE").is_ok() {
                 println!("  {}; {:?}", said(), result.verdicts);
@@ -143,7 +143,7 @@ fn counted(plants: usize) -> [(usize, usize); 3] {
         }
     }
     println!("inertia, viscous, Coulomb of {plants} other plants (given, inside): {counts:?}");
-    assert!(far.is_empty(), "{far:?}");
+    assert!(missed.is_empty(), "{missed:?}");
     counts
 }
 

@@ -123,8 +123,8 @@ fn intervals_contain_the_truth() {
         let share = *inside as f64 / *given as f64;
         assert!(share >= least_share(repetitions), "{parameter:?}: the interval holds in {inside} of {given}");
         // 95 % of a normal error are 2 of its RMS, of a dozen stretches 2.2; to the side of friction that falls with speed the interval is that of a fit
-        // with one more column, up to three times as far; and the RMS of 30 errors is known to a quarter.
-        assert!((1.5..5.5).contains(ratio), "{parameter:?}: the half width is {ratio:.2} times the RMS error");
+        // with one more column, which on these legs knows Coulomb friction 4.6 times less (2.2 (1 + 4.6) / 2 = 6.2); the RMS of 30 errors is known to a quarter.
+        assert!((1.5..8.0).contains(ratio), "{parameter:?}: the half width is {ratio:.2} times the RMS error");
     }
     // An interval that always holds is too wide: not all of them may.
     let all: u64 = counts.iter().map(|(_, inside, _)| inside).sum();

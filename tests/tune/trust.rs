@@ -181,7 +181,8 @@ fn enough(counts: [(u64, u64); 3]) {
 fn intervals_contain_what_many_programs_say() {
     let options = TuneOptions { axes: vec!["X".to_owned()], ..TuneOptions::default() };
     let repetitions = asked().unwrap_or(24);
-    let counts = held(&options, &["X"], repetitions, 12);
+    let many = if asked().is_some() { 48 } else { 12 };
+    let counts = held(&options, &["X"], repetitions, many);
     assert!(counts.iter().all(|(certain, _)| *certain == repetitions), "{counts:?}");
     enough(counts);
     let mean = counts.iter().map(|(certain, held)| *held as f64 / *certain as f64).sum::<f64>() / 3.0;
@@ -193,7 +194,7 @@ fn intervals_contain_what_many_programs_say() {
 fn intervals_of_a_tuning_for_the_contour_contain_what_many_programs_say() {
     let Some(repetitions) = asked().map(|asked| asked.div_ceil(2)) else { return };
     let options = TuneOptions { objective: Objective::Contour, ..TuneOptions::default() };
-    let counts = held(&options, &["X", "Y"], repetitions, 8);
+    let counts = held(&options, &["X", "Y"], repetitions, 24);
     assert!(counts.iter().all(|(certain, _)| *certain > repetitions / 4), "{counts:?}");
     enough(counts);
 }
