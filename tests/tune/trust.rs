@@ -149,6 +149,7 @@ fn held(options: &TuneOptions, axes: &[&str], repetitions: u64, many: u64) -> [(
         let text: String = (0..3).map(|part| random_program(3 * seed + part).replace("M30\n", "")).collect();
         course(&loaded, "t.mpf", &(text + "M30\n"), false)
     };
+    // None of these is one of the repetitions.
     let truth = tuned(&loaded, (1000..1000 + many).map(long).collect(), options);
     let mut counts = [(0, 0); 3];
     for seed in 0..repetitions {
@@ -181,7 +182,7 @@ fn enough(counts: [(u64, u64); 3]) {
 fn intervals_contain_what_many_programs_say() {
     let options = TuneOptions { axes: vec!["X".to_owned()], ..TuneOptions::default() };
     let repetitions = asked().unwrap_or(24);
-    let many = if asked().is_some() { 48 } else { 12 };
+    let many = if asked().is_some() { 48 } else { 24 };
     let counts = held(&options, &["X"], repetitions, many);
     assert!(counts.iter().all(|(certain, _)| *certain == repetitions), "{counts:?}");
     enough(counts);
