@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 """Traces of another plant than the one that is fitted, for tests/identify: a load behind a spring with play, and Stribeck friction.
 
-Goes in: the two cases below. Comes out: tests/identify/other_plant.csv, read by tests/identify/other_plant.rs. Controllers as in
-models/drive.md section 4; the plant is integrated numerically (fourth-order Runge-Kutta, 12.5 us) with friction as a smooth function of
-speed. Nothing is shared with the Rust code. The values printed are the truth that an identification must not miss in its intervals.
+Goes in: the two cases below, and PLANTS plants drawn at random. Comes out: tests/identify/other_plant.csv (the cases, with noise) and
+tests/identify/other_plants.csv (the plants, and of the first SAMPLED of them every STRIDE-th row, without noise), read by
+tests/identify/other_plant.rs. Controllers as in models/drive.md section 4; the plant is integrated numerically (fourth-order Runge-Kutta,
+12.5 us) with friction as a smooth function of speed. Nothing is shared with the Rust code. The values printed are the truth that an
+identification must not miss in its intervals. `--plants` writes the second file alone; the profile is shared with tune_reference.py by hand.
 
     python3 -m venv .venv && .venv/bin/pip install numpy
     .venv/bin/python tools/identify_reference.py
@@ -11,6 +13,7 @@ speed. Nothing is shared with the Rust code. The values printed are the truth th
 
 import math
 import pathlib
+import sys
 
 import numpy as np
 
@@ -108,7 +111,78 @@ def simulate(p, xset, rng):
     return [row[:5] + (n,) for row, n in zip(rows, noisy)]
 
 
+PLANTS, SAMPLED, STRIDE = 200, 6, 40
+
+
+def drawn(rng):
+    """A plant between stiff and soft, with a little friction at low speed or much, and how far it moves."""
+    inertia = rng.uniform(.010, .018)
+    return dict(
+        J=inertia, B=rng.uniform(.008, .02), Tc=rng.uniform(1.0, 2.2), over=rng.uniform(0, .8), ws=rng.uniform(1, 25),
+        Jl=inertia * rng.uniform(.25, .55), c=350 * (2500 / 350) ** rng.uniform(), d=rng.uniform(.15, .4),
+        play=rng.uniform(0, .004), scale=rng.uniform(.7, 1.2))
+
+
+def side_by_side(plants, xset):
+    """The same as `simulate`, without noise, all plants at once: measured position and mean current, one row a cycle."""
+    J, B, Tc, over, ws, Jl, c, d, play, scale = (np.array([p[k] for p in plants]) for k in plants[0])
+    state = np.zeros((5, len(plants)))
+    iv, ii, mean = np.zeros(len(plants)), np.zeros(len(plants)), np.zeros(len(plants))
+    h, rows = TI / SUB, []
+
+    def slope(z, u):
+        i, wm, tm, wl, tl = z
+        twist = tm - tl
+        beyond = np.where(np.abs(twist) > play / 2, twist - np.copysign(play / 2, twist), 0.0)
+        s = np.where(beyond != 0.0, c * beyond + d * (wm - wl), 0.0)
+        friction = np.tanh(wl / .02) * Tc * (1 + over * np.exp(-(wl / ws) ** 2)) + B * wl
+        return np.array([(u - R * i - KE * wm) / L, (KT * i - s) / (J - Jl), wm, (s - friction) / Jl, wl])
+
+    def pi(off, gain, reset, limit, integral):
+        more = gain * TI / reset * off
+        asked = gain * off + integral + more
+        given = np.clip(asked, -limit, limit)
+        return given, integral + np.where((given == asked) | (off * asked < 0), more, 0.0)
+
+    for k, x in enumerate(xset):
+        measured = np.floor(R_LU * state[4] / 1e-3 + .5) * 1e-3
+        e = scale * xset[max(k - 1, 0)] - measured
+        wref = (KV * e + KVFF * scale * (x - xset[max(k - 1, 0)]) / TP) / R_LU
+        rows.append((measured, mean))
+        total = np.zeros(len(plants))
+        for _ in range(NP):
+            tref, iv = pi(wref - state[1], KP, TN, KT * IMAX, iv)
+            u, ii = pi(tref / KT - state[0], KPI, TNI, UMAX, ii)
+            total += state[0]
+            for _ in range(SUB):
+                k1 = slope(state, u)
+                k2 = slope(state + h / 2 * k1, u)
+                k3 = slope(state + h / 2 * k2, u)
+                k4 = slope(state + h * k3, u)
+                state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        mean = total / NP
+    return rows
+
+
+def write_plants():
+    out = pathlib.Path(__file__).resolve().parent.parent / "tests" / "identify" / "other_plants.csv"
+    rng = np.random.default_rng(7)
+    plants = [{k: float(f"{v:.6g}") for k, v in drawn(rng).items()} for _ in range(PLANTS)]
+    lines = ["plant," + ",".join(plants[0])]
+    lines += [f"{n}," + ",".join(f"{v:.6g}" for v in p.values()) for n, p in enumerate(plants)]
+    lines.append("row,then position_mm and current_a of each of the first plants")
+    rows = side_by_side(plants[:SAMPLED], profile())
+    for k in range(0, len(rows), STRIDE):
+        cells = [f"{m:.3f},{i:.4f}" for m, i in zip(*rows[k])]
+        lines.append(f"row {k}," + ",".join(cells))
+    out.write_text("\n".join(lines) + "\n")
+    print(len(lines), "lines", out.stat().st_size, "bytes")
+
+
 def main():
+    write_plants()
+    if "--plants" in sys.argv[1:]:
+        return
     out = pathlib.Path(__file__).resolve().parent.parent / "tests" / "identify" / "other_plant.csv"
     xset = profile()
     rng = np.random.default_rng(20)

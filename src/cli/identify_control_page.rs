@@ -4,40 +4,29 @@
 //! runs no script.
 
 use super::identify_control::control_text;
+use super::identify_page::{BOTTOM, LEFT, MARGIN, WIDTH, whole};
 use crate::base::units::mm_min_from_mm_s;
 use crate::identify::{ControlResult, FeedOverPath};
 use crate::report::escape;
 
-/// Size of a drawing in its own units.
-const WIDTH: f64 = 720.0;
+/// Height of a drawing in its own units.
 const HEIGHT: f64 = 220.0;
-const LEFT: f64 = 64.0;
-const MARGIN: f64 = 14.0;
-const BOTTOM: f64 = 34.0;
 
-const STYLE: &str = "\
-:root{color-scheme:light dark;--ink:#1b1f24;--paper:#fff;--grid:#d7dce1;--traced:#0b61a4;--before:#8a9099;--after:#c2410c}\
-@media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--paper:#14171a;--grid:#343a40;--traced:#6cb6ff;--before:#7b828a;--after:#ff9d5c}}\
-body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:70rem;margin:2rem auto;padding:0 1rem}\
-pre{overflow-x:auto;border:1px solid var(--grid);padding:.6rem;font-size:12px}svg{width:100%;height:auto;display:block}\
-svg text{fill:var(--ink);font:11px system-ui,sans-serif}.grid{stroke:var(--grid);stroke-width:1}polyline{fill:none}\
-.traced{stroke:var(--traced);stroke-width:2.4;opacity:.55}.before{stroke:var(--before);stroke-width:1;stroke-dasharray:4 3}\
-.after{stroke:var(--after);stroke-width:1}";
+const OF_CONTROL: &str = "\
+pre{overflow-x:auto;border:1px solid var(--grid);padding:.6rem;font-size:12px}polyline{fill:none}\
+.traced{stroke:var(--a);stroke-width:2.4;opacity:.55}.before{stroke:var(--c);stroke-width:1;stroke-dasharray:4 3}\
+.after{stroke:var(--b);stroke-width:1}";
 
 /// The whole document.
 pub(super) fn page(machine: &str, result: &ControlResult, files: &[String]) -> String {
     let title = format!("{}: control calibrated", escape(machine));
-    let mut text = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
-         <title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n<pre>{}</pre>\n",
-        escape(&control_text(result, files))
-    );
+    let mut text = format!("<pre>{}</pre>\n", escape(&control_text(result, files)));
     text += "<h2>Feed over the path</h2>\n<p>Broad: traced. Dashed: planned with the machine file as it was. Thin: planned as calibrated.</p>\n";
     for (place, (feeds, file)) in result.feeds.iter().zip(files).enumerate() {
         let used = if place < result.fitted { "used for the fit" } else { "not used for the fit" };
         text += &format!("<h3>{} ({used})</h3>\n{}", escape(file), drawing(feeds));
     }
-    text + "</body></html>\n"
+    whole(&title, OF_CONTROL, &text)
 }
 
 fn drawing(feeds: &FeedOverPath) -> String {

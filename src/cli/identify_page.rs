@@ -8,30 +8,37 @@ use crate::machine::{Axis, Machine};
 use crate::report::escape;
 use std::path::PathBuf;
 
-/// Size of the drawing in its own units.
-const WIDTH: f64 = 720.0;
+/// Width of a drawing in its own units, and its borders.
+pub(super) const WIDTH: f64 = 720.0;
+pub(super) const LEFT: f64 = 70.0;
+pub(super) const MARGIN: f64 = 14.0;
+pub(super) const BOTTOM: f64 = 34.0;
 const HEIGHT: f64 = 260.0;
-const LEFT: f64 = 70.0;
-const MARGIN: f64 = 14.0;
-const BOTTOM: f64 = 34.0;
 
+/// Of every page of identify: three colours of lines, a, b and c.
 const STYLE: &str = "\
-:root{color-scheme:light dark;--ink:#1b1f24;--paper:#fff;--grid:#d7dce1;--a:#0b61a4;--b:#c2410c}\
-@media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--paper:#14171a;--grid:#343a40;--a:#6cb6ff;--b:#ff9d5c}}\
-body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:60rem;margin:2rem auto;padding:0 1rem}\
-svg{width:100%;height:auto;display:block}svg text{fill:var(--ink);font:11px system-ui,sans-serif}\
-.grid{stroke:var(--grid);stroke-width:1}.law{fill:none;stroke:var(--b);stroke-width:1.8}.point{fill:var(--a)}\
-.table{overflow-x:auto}\
-table{border-collapse:collapse}td,th{padding:.15rem .9rem .15rem 0;text-align:left}td.n{text-align:right;font-variant-numeric:tabular-nums}";
+:root{color-scheme:light dark;--ink:#1b1f24;--paper:#fff;--grid:#d7dce1;--a:#0b61a4;--b:#c2410c;--c:#8a9099}\
+@media(prefers-color-scheme:dark){:root{--ink:#e6e8ea;--paper:#14171a;--grid:#343a40;--a:#6cb6ff;--b:#ff9d5c;--c:#7b828a}}\
+body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:66rem;margin:2rem auto;padding:0 1rem}\
+svg{width:100%;height:auto;display:block}svg text{fill:var(--ink);font:11px system-ui,sans-serif}.grid{stroke:var(--grid);stroke-width:1}";
+const OF_AXES: &str = "\
+.law{fill:none;stroke:var(--b);stroke-width:1.8}.point{fill:var(--a)}.table{overflow-x:auto}table{border-collapse:collapse}\
+td,th{padding:.15rem .9rem .15rem 0;text-align:left}td.n{text-align:right;font-variant-numeric:tabular-nums}";
+
+/// A document with that style and more of it; the title is escaped already.
+pub(super) fn whole(title: &str, style: &str, body: &str) -> String {
+    format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
+         <title>{title}</title>\n<style>{STYLE}{style}</style></head>\n<body>\n<h1>{title}</h1>\n{body}</body></html>\n"
+    )
+}
 
 /// The whole document.
 pub(super) fn page(results: &[AxisResult], machine: &Machine, traces: &[PathBuf]) -> String {
     let title = format!("{}: identified", escape(&machine.name));
     let names: Vec<String> = traces.iter().map(|path| escape(&path.display().to_string())).collect();
     let mut text = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
-         <title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n\
-         <p>Traces: {}. Intervals are those of 95 %. Torque constant, transmission and cycles are those of the machine file.</p>\n",
+        "<p>Traces: {}. Intervals are those of 95 %. Torque constant, transmission and cycles are those of the machine file.</p>\n",
         names.join(", ")
     );
     for result in results {
@@ -39,7 +46,7 @@ pub(super) fn page(results: &[AxisResult], machine: &Machine, traces: &[PathBuf]
             text += &section(result, axis);
         }
     }
-    text + "</body></html>\n"
+    whole(&title, OF_AXES, &text)
 }
 
 fn section(result: &AxisResult, axis: &Axis) -> String {

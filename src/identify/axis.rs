@@ -4,9 +4,9 @@
 //! keys. Does not read files.
 
 use super::aliasing::folding;
-use super::feedforward::controllers;
+use super::choice::{Chosen, chosen};
+use super::feedforward::{controllers, left_out};
 use super::friction::{Mechanics, one_shot};
-use super::motion::Motion;
 use super::record::{AxisRecord, read};
 use super::refine::refine;
 use super::speed_loop::speed_loop;
@@ -73,10 +73,19 @@ fn one_axis(
         return Ok(result);
     };
     let cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
-    let mut records = Vec::new();
+    let (mut records, mut unreadable) = (Vec::new(), Vec::new());
     for trace in traces {
-        records.extend(read(trace, axis, data, cycle_s)?);
+        match read(trace, axis, data, cycle_s) {
+            Ok(record) => records.extend(record),
+            Err(finding) => unreadable.push(finding),
+        }
     }
+    if records.is_empty()
+        && let Some(finding) = unreadable.pop()
+    {
+        return Err(finding);
+    }
+    result.verdicts.extend(unreadable.into_iter().map(|finding| format!("{}: left out", finding.message)));
     if records.is_empty() {
         for parameter in Parameter::ALL {
             result.refuse(
@@ -90,7 +99,11 @@ fn one_axis(
     let mut found = controllers(&records, axis, data, cycle_s, &mut result);
     let speed_cycle_s = machine.cycle.time_base.seconds(data.speed_cycle_ticks);
     found.extend(speed_loop(&records, data, speed_cycle_s, &mut result));
-    let mechanics = mechanics(&records, machine, axis, data, &mut result);
+    // A simulation of the controllers has what the traces told of them.
+    let told = with_estimates(data, &found);
+    let told =
+        DriveData { identified: data.identified || found.iter().any(|e| e.parameter == Parameter::SpeedGain), ..told };
+    let (mechanics, records) = mechanics(&records, machine, axis, &told, &mut result);
     let refined = if options.linear_only {
         None
     } else {
@@ -138,27 +151,21 @@ fn with_estimates(data: &DriveData, found: &[Estimate]) -> DriveData {
     data
 }
 
-/// Inertia, friction, gravity.
+/// Inertia, friction, gravity, and the records that they rest on.
 fn mechanics(
     records: &[AxisRecord],
     machine: &Machine,
     axis: &Axis,
     data: &DriveData,
     result: &mut AxisResult,
-) -> Mechanics {
+) -> (Mechanics, Vec<AxisRecord>) {
     let r = data.mechanics.transmission_lu_per_rad;
-    let usable: Vec<&AxisRecord> = records.iter().filter(|record| record.torque.is_some()).collect();
-    let best = usable.iter().filter_map(|record| record.torque.as_ref()).map(|torque| torque.source).min_by_key(rank);
+    let cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
+    let Chosen { records: of_best, motions, others, source: best } = chosen(records, r, axis.kind, cycle_s);
+    for (record, why) in &others {
+        left_out(std::slice::from_ref(record), why, "the mechanics", result);
+    }
     result.torque_source = best;
-    // Samples and means are not mixed: the best source of all traces counts.
-    let of_best: Vec<AxisRecord> = usable
-        .into_iter()
-        .filter(|record| {
-            record.torque.as_ref().map(|torque| torque.source.is_folded()) == best.map(TorqueSource::is_folded)
-        })
-        .cloned()
-        .collect();
-    let motions: Vec<Motion> = of_best.iter().filter_map(|record| Motion::of(record, r)).collect();
     let (Some(source), false) = (best, motions.is_empty()) else {
         let (reason, remedy) = if best.is_none() {
             (
@@ -174,7 +181,7 @@ fn mechanics(
         for parameter in &Parameter::ALL[..6] {
             result.refuse(*parameter, reason, remedy);
         }
-        return Mechanics::default();
+        return (Mechanics::default(), of_best);
     };
     result.verdicts.push(format!("torque from: {}; position from: {}", source.title(), of_best[0].position_from));
     let mut found = one_shot(&motions, axis, result);
@@ -190,16 +197,7 @@ fn mechanics(
     };
     push("moving_s", "time in motion that was used", found.moving_s, "s");
     push("condition_ratio", "condition of the least squares", found.condition, "");
-    found
-}
-
-fn rank(source: &TorqueSource) -> u8 {
-    match source {
-        TorqueSource::MeanCurrent => 0,
-        TorqueSource::FineCurrent => 1,
-        TorqueSource::Current => 2,
-        TorqueSource::TorqueReference => 3,
-    }
+    (found, of_best)
 }
 
 /// Inertia that may be wrong by sampling without being refused.

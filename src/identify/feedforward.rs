@@ -97,9 +97,21 @@ fn largest(records: &[AxisRecord], of: impl Fn(&AxisRecord) -> &Option<Vec<f64>>
     all.fold(0.0_f64, |most, value| most.max(value.abs()))
 }
 
-/// Whether every record has the signal.
+/// Whether a record has the signal: those that do not have no rows of it.
 fn have(records: &[AxisRecord], of: impl Fn(&AxisRecord) -> &Option<Vec<f64>>) -> bool {
-    !records.is_empty() && records.iter().all(|record| of(record).is_some())
+    records.iter().any(|record| of(record).is_some())
+}
+
+/// Whether a record is one of the controllers at work: set-points that move, at the position cycle.
+fn usable(record: &AxisRecord, cycle_s: f64) -> bool {
+    moves(std::slice::from_ref(record)) && (record.period_s / cycle_s - 1.0).abs() <= 1e-3
+}
+
+/// Without those that have the feed-forward switched off, where it is on in another.
+fn switched_on(records: &[AxisRecord], of: impl Fn(&AxisRecord) -> &Option<Vec<f64>> + Copy) -> Vec<AxisRecord> {
+    let on = |record: &&AxisRecord| largest(std::slice::from_ref(*record), of) > 0.0;
+    let all: Vec<AxisRecord> = records.iter().filter(on).cloned().collect();
+    if all.is_empty() { records.to_vec() } else { all }
 }
 
 /// Everything about the controllers in front of the speed loop.
@@ -124,7 +136,10 @@ pub(super) fn controllers(
         }
         return found;
     }
-    if let Some(record) = records.iter().find(|record| (record.period_s / cycle_s - 1.0).abs() > 1e-3) {
+    let (records, others): (Vec<AxisRecord>, Vec<AxisRecord>) =
+        records.iter().cloned().partition(|record| usable(record, cycle_s));
+    if records.is_empty() {
+        let record = others.iter().find(|record| moves(std::slice::from_ref(*record))).unwrap_or(&others[0]);
         let (period_ms, cycle_ms) = (record.period_s * MS_PER_S, cycle_s * MS_PER_S);
         let reason = format!("the trace has a sample every {period_ms:.3} ms, the position cycle is {cycle_ms:.3} ms");
         for (parameter, _) in CONTROLLER_PARAMETERS {
@@ -132,12 +147,21 @@ pub(super) fn controllers(
         }
         return found;
     }
-    velocity_feedforward(records, &mut found, result);
-    torque_feedforward(records, data, &mut found, result);
+    left_out(&others, "it has no moving set-point at the position cycle", "its controllers", result);
+    let records = records.as_slice();
+    velocity_feedforward(&switched_on(records, |record| &record.velocity_feedforward_lu_s), &mut found, result);
+    torque_feedforward(&switched_on(records, |record| &record.torque_feedforward_n_m), data, &mut found, result);
     setpoint_delay(records, &mut found, result);
     position_gain(records, data, &mut found, result);
     lags(records, axis, result);
     found
+}
+
+/// Says which traces are not used for something, and why.
+pub(super) fn left_out(records: &[AxisRecord], why: &str, of: &str, result: &mut AxisResult) {
+    for record in records {
+        result.verdicts.push(format!("`{}` is left out for {of}: {why}", record.trace));
+    }
 }
 
 const CONTROLLER_PARAMETERS: [(Parameter, ()); 5] = [

@@ -6,11 +6,11 @@
 //! τ = J (w' - d w'') + B w + Tc sgn w + g0 + gs sin x + gc cos x            rows near a standstill are left out
 //! ```
 //! d is how late the torque stands behind the position in the trace.
-//! The interval has two parts. The first is that of the noise (`normal`). The second is that of the law: terms that it does not have
-//! (friction that falls with speed or grows with its square, another viscosity in each direction, a spring
-//! behind the motor) are tried one by one and together, and by as much as a significant one moves a value, its interval is widened. Does not
-//! correct values by such terms: a drive model that has no place for them could not hold them.
+//! The interval has two parts. The first is that of the noise (`normal`). The second is that of the law (`beyond`): where the value would be if a term that the
+//! law does not have were there (friction that falls with speed or grows with its square, another viscosity in each direction, a spring
+//! behind the motor). It reaches further to the side to which such a term moves the value.
 
+use super::beyond::beyond;
 use super::motion::Motion;
 use super::normal::{Blocks, Solution};
 use super::wire::{AxisResult, Estimate, Figure, Means, Parameter};
@@ -20,39 +20,30 @@ use crate::machine::Axis;
 use nalgebra::DVector;
 
 /// Columns of a row.
-const J: usize = 0;
-const B: usize = 1;
-const TC: usize = 2;
+pub(super) const J: usize = 0;
+pub(super) const B: usize = 1;
+pub(super) const TC: usize = 2;
 const G0: usize = 3;
 const GS: usize = 4;
 const GC: usize = 5;
 const SHIFT: usize = 6;
-const SPRING: usize = 7;
-const STRIBECK: [usize; 3] = [8, 9, 10];
-const SQUARE: usize = 11;
-const ONE_SIDED: usize = 12;
+pub(super) const SPRING: usize = 7;
+pub(super) const STRIBECK: [usize; 4] = [8, 9, 10, 14];
+pub(super) const SQUARE: usize = 11;
+pub(super) const ONE_SIDED: usize = 12;
 const PLACE: usize = 13;
-const WIDTH: usize = 14;
+const WIDTH: usize = 15;
 
-/// Terms that the law does not have, and what one that is there means.
-const ALTERNATIVES: [(usize, &str); 6] = [
-    (STRIBECK[0], "friction is higher at low speed (Stribeck)"),
-    (STRIBECK[1], "friction is higher at low speed (Stribeck)"),
-    (STRIBECK[2], "friction is higher at low speed (Stribeck)"),
-    (SQUARE, "friction bends with speed"),
-    (ONE_SIDED, "friction grows differently in the two directions"),
-    (SPRING, "motor and scale do not move as one body (elastic drive train)"),
-];
-/// Speeds of the Stribeck terms, as shares of the highest.
-const STRIBECK_SHARES: [f64; 3] = [0.02, 0.05, 0.15];
-/// Standard errors from which an alternative counts: six are tried, and in one trace of twenty that follows the law one of them may count by
-/// chance (0.05 / 6 two-sided).
-const SIGNIFICANT: f64 = 2.64;
-/// Standard errors on each side of a 95 % interval.
-const HALF_95: f64 = 1.96;
-/// How much of the shift by an alternative an interval takes in: the true law is neither of the two, and how far they lie apart counts as one standard
-/// error of what the law leaves out.
-const SHIFT_TAKEN: f64 = HALF_95;
+/// Speeds of the Stribeck terms, as shares of the highest: friction that falls over more than a third of the speeds is bent, and no more told from a viscous one.
+const STRIBECK_SHARES: [f64; 4] = [0.02, 0.05, 0.15, 0.3];
+/// Shift of a value by terms beside the law from which the simulated axis, which has the same law, is not held against the trace.
+const MISFIT_SHARE: f64 = 0.1;
+/// Share of what looks like acceleration that may be the quantum of the scale, and how well that share is known.
+const QUANTUM_SHARE: (f64, f64) = (0.25, 0.25);
+/// Share of the highest torque that is next to none.
+const NEAR_NONE_SHARE: f64 = 0.02;
+/// Share of the torque that a law may leave over.
+const UNEXPLAINED_SHARE: f64 = 0.25;
 /// What differences at the position cycle do to the values at most, found on traces without noise: inertia and Coulomb friction, and the others.
 const METHOD_SHARE: (f64, f64) = (1.5e-4, 5e-4);
 /// Length of a block: many times the window and the memory of a speed loop.
@@ -78,6 +69,8 @@ pub(super) struct Mechanics {
     pub(super) moving_s: f64,
     /// Terms beside the law move a value by more than a little.
     pub(super) misfit: bool,
+    /// How much further than the noise terms beside the law let a value lie, downwards and upwards.
+    pub(super) room: Vec<(Parameter, [f64; 2])>,
 }
 
 impl Mechanics {
@@ -89,6 +82,9 @@ impl Mechanics {
 /// Rows of all motions, and what they cover.
 struct Covered {
     blocks: Blocks,
+    speed_max_rad_s: f64,
+    /// Sum of squares that the quantum of the scale adds to the accelerations.
+    quantum_square: f64,
     torque_max_n_m: f64,
     /// Time of motion forward and backward.
     direction_s: [f64; 2],
@@ -113,6 +109,8 @@ fn covered(motions: &[Motion]) -> Covered {
     let block_s = (motions.iter().map(seconds).sum::<f64>() / BLOCKS).clamp(BLOCK_S.0, BLOCK_S.1);
     let mut all = Covered {
         blocks: Blocks::new(WIDTH),
+        speed_max_rad_s,
+        quantum_square: 0.0,
         torque_max_n_m: 0.0,
         direction_s: [0.0; 2],
         range_lu: 0.0,
@@ -129,6 +127,7 @@ fn covered(motions: &[Motion]) -> Covered {
                 continue;
             }
             all.blocks.push_in(k / per_block, &row, motion.torque_n_m[k]);
+            all.quantum_square += motion.quantum_rad2_s4;
             all.torque_max_n_m = all.torque_max_n_m.max(motion.torque_n_m[k].abs());
             all.direction_s[usize::from(row[TC] < 0.0)] += motion.period_s;
             if row[J].abs() < CONSTANT_SHARE * acceleration_max_rad_s2 {
@@ -164,6 +163,7 @@ fn row(motion: &Motion, k: usize, speed_max_rad_s: f64) -> [f64; WIDTH] {
         w * w.abs(),
         w.abs(),
         motion.position_lu[k],
+        stribeck(STRIBECK_SHARES[3]),
     ]
 }
 
@@ -178,10 +178,21 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult)
         return found;
     };
     (found.condition, found.rms_n_m) = (solution.condition, solution.rms);
-    let shifts = misfits(&all.blocks, &columns, &solution, &mut result.verdicts);
-    let moved =
-        |place: usize| matches!(columns[place], J | B | TC) && shifts[place] > 0.02 * solution.theta[place].abs();
+    let beyond = beyond(&all.blocks, &columns, &solution, &mut result.verdicts);
+    let moved = |place: usize| {
+        matches!(columns[place], J | B | TC) && beyond.shifts[place] > MISFIT_SHARE * solution.theta[place].abs()
+    };
     found.misfit = (0..columns.len()).any(moved);
+    if beyond.open {
+        let reason = "friction falls over a third of the speeds and more: what is constant and what grows with speed is not told apart";
+        for parameter in [Parameter::Viscous, Parameter::Coulomb] {
+            result.refuse(
+                parameter,
+                reason,
+                "record more constant speeds, up to the highest (`sollwert identify --plan`)",
+            );
+        }
+    }
     for (place, column) in columns.iter().enumerate() {
         let Some(parameter) = parameter_of(*column, both).filter(|parameter| result.refusal(*parameter).is_none())
         else {
@@ -189,8 +200,30 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult)
         };
         let (value, noise) = solution.value(place);
         let method = if matches!(*column, J | TC) { METHOD_SHARE.0 } else { METHOD_SHARE.1 };
-        let half = noise.hypot(method * value).hypot(SHIFT_TAKEN * shifts[place]);
-        let estimate = Estimate::around(parameter, value, half, Means::OneShot);
+        let half = noise.hypot(method * value);
+        // How much further than the noise the law itself lets the value lie, downwards and upwards.
+        let room = [(value - beyond.low[place] - half).max(0.0), (beyond.high[place] - value - half).max(0.0)];
+        found.room.push((parameter, room));
+        let mut estimate = Estimate::around(parameter, value, half, Means::OneShot).reaching(room);
+        if parameter == Parameter::Viscous && estimate.value < 0.0 && estimate.high >= 0.0 {
+            // No friction drives an axis.
+            estimate.value = 0.0;
+        }
+        if parameter == Parameter::Inertia {
+            // Noise of the scale in the acceleration makes a slope too small, by its share of what the column has of its own.
+            let share = (all.quantum_square / solution.own_square[place]).min(1.0);
+            if share > QUANTUM_SHARE.0 {
+                let percent = percent_from_ratio(share);
+                let reason = format!("{percent:.0} % of what looks like acceleration is the quantum of the scale");
+                result.refuse(
+                    parameter,
+                    reason,
+                    "record jerk-limited moves at the highest acceleration (`sollwert identify --plan`)",
+                );
+                continue;
+            }
+            estimate = estimate.scaled(1.0 / (1.0 - share)).widened(QUANTUM_SHARE.1 * share * value.abs());
+        }
         match verdict(&estimate, &all, solution.stretches[place], found.value(Parameter::Coulomb)) {
             None => found.estimates.push(estimate),
             Some((reason, remedy)) => result.refuse(parameter, reason, remedy),
@@ -200,6 +233,39 @@ pub(super) fn one_shot(motions: &[Motion], axis: &Axis, result: &mut AxisResult)
     late(&columns, &solution, motions, result);
     points(motions, &columns, &solution.theta, result);
     found
+}
+
+/// Which motions the law of the others does not explain. Those that a law of their own explains decide; without any of them, all are kept.
+pub(super) fn unexplained(motions: &[Motion], rotary: bool) -> Vec<bool> {
+    let none = vec![false; motions.len()];
+    if motions.len() < 2 {
+        return none;
+    }
+    let blocks: Vec<Blocks> = motions.iter().map(|motion| covered(std::slice::from_ref(motion)).blocks).collect();
+    let left_share = |blocks: &Blocks, columns: &[usize], theta: &DVector<f64>| {
+        (blocks.residual_square(columns, theta) / blocks.response_square()).sqrt()
+    };
+    let explains_itself = |blocks: &Blocks| {
+        let (columns, solution) = any_law(blocks, rotary)?;
+        (solution.theta[J] > 0.0 && left_share(blocks, &columns, &solution.theta) <= UNEXPLAINED_SHARE).then_some(())
+    };
+    let own: Vec<bool> = blocks.iter().map(|blocks| explains_itself(blocks).is_some()).collect();
+    let good: Vec<Motion> =
+        motions.iter().zip(&own).filter(|(_, own)| **own).map(|(motion, _)| motion.clone()).collect();
+    if good.is_empty() || good.len() == motions.len() {
+        return none;
+    }
+    let Some((columns, solution)) = any_law(&covered(&good).blocks, rotary) else { return none };
+    let strange =
+        |(blocks, own): (&Blocks, &bool)| !own && left_share(blocks, &columns, &solution.theta) > UNEXPLAINED_SHARE;
+    blocks.iter().zip(&own).map(strange).collect()
+}
+
+/// The law with as many of its columns as the motion tells apart; the inertia is the first.
+fn any_law(blocks: &Blocks, rotary: bool) -> Option<(Vec<usize>, Solution)> {
+    let laws: [&[usize]; 4] =
+        [&[J, B, TC, G0, SHIFT, GS, GC], &[J, B, TC, G0, SHIFT], &[J, B, G0, SHIFT], &[J, TC, G0, SHIFT]];
+    laws.into_iter().skip(usize::from(!rotary)).find_map(|columns| Some((columns.to_vec(), blocks.solve(columns)?)))
 }
 
 const PLAN: &str =
@@ -275,46 +341,6 @@ fn parameter_of(column: usize, both: bool) -> Option<Parameter> {
     }
 }
 
-/// By how much significant terms beside the law move each value; what they mean goes into `verdicts`.
-fn misfits(blocks: &Blocks, columns: &[usize], law: &Solution, verdicts: &mut Vec<String>) -> Vec<f64> {
-    let mut shifts = vec![0.0_f64; columns.len()];
-    let mut with = columns.to_vec();
-    let mut said: Vec<&str> = Vec::new();
-    let mut take = |solution: &Solution| {
-        let mut largest = 0.0_f64;
-        for (place, shift) in shifts.iter_mut().enumerate() {
-            let by = (solution.theta[place] - law.theta[place]).abs();
-            *shift = shift.max(by);
-            if matches!(columns[place], J | B | TC) {
-                largest = largest.max(by / law.theta[place].abs());
-            }
-        }
-        largest
-    };
-    for (column, meaning) in ALTERNATIVES.iter().filter(|(column, _)| !columns.contains(column)) {
-        let mut one = columns.to_vec();
-        one.push(*column);
-        let Some(solution) = blocks.solve(&one) else { continue };
-        let (value, half) = solution.value(columns.len());
-        if value.abs() <= SIGNIFICANT / HALF_95 * half {
-            continue;
-        }
-        let largest = take(&solution);
-        with.push(*column);
-        if largest > 0.01 && !said.contains(meaning) {
-            said.push(meaning);
-            let percent = percent_from_ratio(largest);
-            verdicts.push(format!("{meaning}: that moves a value by {percent:.1} %, and the intervals take it in"));
-        }
-    }
-    if with.len() > columns.len() + 1
-        && let Some(together) = blocks.solve(&with)
-    {
-        take(&together);
-    }
-    shifts
-}
-
 /// Why an estimate is none, and what to do.
 fn verdict(estimate: &Estimate, all: &Covered, stretches: f64, coulomb: Option<f64>) -> Option<(String, String)> {
     let (value, half) = (estimate.value, estimate.half());
@@ -338,27 +364,28 @@ fn verdict(estimate: &Estimate, all: &Covered, stretches: f64, coulomb: Option<f
             ),
             "record jerk-limited moves at the highest acceleration (`sollwert identify --plan`)".to_owned(),
         )),
-        Parameter::Viscous if value < -half => Some((
+        Parameter::Viscous if estimate.high < 0.0 => Some((
             "friction falls with speed: a viscous law does not hold here".to_owned(),
             "record more constant speeds, up to the highest (`sollwert identify --plan`)".to_owned(),
         )),
-        Parameter::Viscous if wide(0.5) => Some((
+        // A viscous friction near none is a value too, where even the end of its interval makes next to no torque.
+        Parameter::Viscous if wide(0.5) && half * all.speed_max_rad_s > NEAR_NONE_SHARE * all.torque_max_n_m => Some((
             format!(
                 "the speeds are too much alike to tell it from constant friction: between {:.2e} and {:.2e}",
                 estimate.low, estimate.high
             ),
             "record constant speeds from 5 to 90 % of the highest (`sollwert identify --plan`)".to_owned(),
         )),
-        Parameter::Coulomb if wide(0.15) && half > 0.02 * all.torque_max_n_m => Some((
+        Parameter::Coulomb if wide(0.15) && half > NEAR_NONE_SHARE * all.torque_max_n_m => Some((
             format!("it is not told from friction that grows with speed: ±{:.0} %", percent(half / value.abs())),
             "record constant speeds from 5 to 90 % of the highest, in both directions".to_owned(),
         )),
-        Parameter::Coulomb if value < -half => Some((
+        Parameter::Coulomb if estimate.high < 0.0 => Some((
             "it comes out negative: the sign of the torque, or the law, does not fit".to_owned(),
             "check which signal is the torque, and its sign".to_owned(),
         )),
         Parameter::Gravity | Parameter::GravitySin | Parameter::GravityCos
-            if half > 0.5 * value.abs().max(coulomb.unwrap_or(0.0)).max(0.02 * all.torque_max_n_m) =>
+            if half > 0.5 * value.abs().max(coulomb.unwrap_or(0.0)).max(NEAR_NONE_SHARE * all.torque_max_n_m) =>
         {
             Some((format!("it is not told from friction: ±{half:.2e} N m"), PLAN.to_owned()))
         }
@@ -406,7 +433,7 @@ fn figures(all: &Covered, columns: &[usize], solution: &Solution, both: bool, re
     }
     let rms = solution.rms;
     push("torque_residual_rms_n_m", "torque that the law leaves over, RMS after the filter", rms);
-    if rms > 0.25 * all.torque_max_n_m {
+    if rms > UNEXPLAINED_SHARE * all.torque_max_n_m {
         result.verdicts.push(
             "a quarter of the torque and more is not explained by the law: something else moves this axis".to_owned(),
         );

@@ -34,6 +34,8 @@ pub(super) struct Motion {
     pub(super) torque_n_m: Vec<f64>,
     /// The axis moves, and has done so in one direction over the whole window.
     pub(super) moves: Vec<bool>,
+    /// What the quantum of the scale makes of the acceleration, variance.
+    pub(super) quantum_rad2_s4: f64,
     /// Highest speed, without the topmost rows.
     pub(super) speed_max_rad_s: f64,
 }
@@ -109,6 +111,8 @@ impl Motion {
             speed_rad_s: speed,
             acceleration_rad_s2: acceleration,
             torque_n_m: torque,
+            quantum_rad2_s4: quantum(position)
+                .map_or(0.0, |quantum| quantum_variance_rad2_s4(quantum, r, period_s, &window)),
             speed_max_rad_s,
         }
     }
@@ -157,4 +161,26 @@ fn moving(speed: &[f64], slow: f64, half: usize) -> Vec<bool> {
         moves[k] = before[k] > half && after > half;
     }
     moves
+}
+
+/// The step of a scale, if the positions stand on one.
+pub(super) fn quantum(position: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = position.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|s| *s > 1e-9).collect();
+    steps.sort_by(f64::total_cmp);
+    let least = *steps.get(steps.len() / 100)?;
+    let near =
+        |step: &&f64| ((**step / least) - (**step / least).round()).abs() < 0.01 * (**step / least).max(1.0).sqrt();
+    let whole = steps.iter().filter(|step| **step < 50.0 * least).filter(near).count();
+    let looked_at = steps.iter().filter(|step| **step < 50.0 * least).count();
+    (looked_at > 20 && whole as f64 > 0.98 * looked_at as f64 && least > 1e-7).then_some(least)
+}
+
+/// Variance of the filtered acceleration that a quantum of the scale makes: of white noise of q²/12 behind the same differences and window.
+fn quantum_variance_rad2_s4(quantum: f64, r: f64, period_s: f64, window: &[f64]) -> f64 {
+    let mut impulse = vec![0.0; 2 * window.len() + 16];
+    let middle = impulse.len() / 2;
+    impulse[middle] = 1.0;
+    let behind = filtered(&differences(&tick_speed_rad_s(&impulse, r, period_s), period_s), window);
+    let square: f64 = behind.iter().filter(|value| value.is_finite()).map(|value| value * value).sum();
+    square * quantum * quantum / 12.0
 }

@@ -39,6 +39,8 @@ pub(super) struct Solution {
     pub(super) without: Vec<DVector<f64>>,
     /// Effective number of independent stretches a value rests on.
     pub(super) stretches: Vec<f64>,
+    /// Sum of squares of each column that the others do not explain.
+    pub(super) own_square: Vec<f64>,
     /// Condition of the columns, each brought to length 1.
     pub(super) condition: f64,
     /// RMS of the residuals.
@@ -120,7 +122,13 @@ impl Blocks {
             without.push(solve_scaled(&(&gram - block_gram), &(&product - block_product), &scale)?);
         }
         let stretches = (0..p).map(|j| stretches(&inverse, j, &picked)).collect();
-        Some(Solution { theta, without, stretches, condition, rms })
+        let own_square = (0..p).map(|j| 1.0 / inverse[(j, j)]).collect();
+        Some(Solution { theta, without, stretches, own_square, condition, rms })
+    }
+
+    /// Sum of squares of the response.
+    pub(super) fn response_square(&self) -> f64 {
+        self.blocks.iter().map(|block| block.square).sum()
     }
 
     /// Sum of squares of the residuals of given values on some columns.

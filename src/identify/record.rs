@@ -14,6 +14,8 @@ use std::f64::consts::TAU;
 /// Samples of one axis at its position cycle (or at the slower cycle of the trace).
 #[derive(Clone, Debug)]
 pub(super) struct AxisRecord {
+    /// Name of the trace.
+    pub(super) trace: String,
     /// Distance of the rows.
     pub(super) period_s: f64,
     /// Rows.
@@ -53,6 +55,7 @@ impl AxisRecord {
             Torque { values_n_m: torque.values_n_m[from..].to_vec(), source: torque.source }
         };
         Self {
+            trace: self.trace.clone(),
             period_s: self.period_s,
             count: self.count.saturating_sub(row),
             setpoint_lu: cut(&self.setpoint_lu),
@@ -126,22 +129,22 @@ impl Reader<'_> {
             values.iter_mut().for_each(|value| *value = rad_from_deg(*value));
         }
         if self.axis.modulo && stem.starts_with("position_") {
-            unwrap(&mut values);
+            unwrap(&mut values, TAU);
         }
         Some(values)
     }
 }
 
-/// A modulo axis goes on behind 360 deg instead of beginning again.
-fn unwrap(angles_rad: &mut [f64]) {
+/// A modulo axis goes on behind a turn instead of beginning again.
+pub(crate) fn unwrap(angles: &mut [f64], turn: f64) {
     let (mut turns, mut before) = (0.0, f64::NAN);
-    for angle_rad in angles_rad.iter_mut().filter(|angle| angle.is_finite()) {
-        let raw_rad = *angle_rad;
+    for angle in angles.iter_mut().filter(|angle| angle.is_finite()) {
+        let raw = *angle;
         if before.is_finite() {
-            turns -= ((raw_rad - before) / TAU).round();
+            turns -= ((raw - before) / turn).round();
         }
-        before = raw_rad;
-        *angle_rad = raw_rad + turns * TAU;
+        before = raw;
+        *angle = raw + turns * turn;
     }
 }
 
@@ -194,6 +197,7 @@ fn at_position_cycle(reader: &Reader<'_>, data: &DriveData, period_s: f64, cycle
     let from_motor = || motor("motor_speed_reference").map(|speed| speed.iter().map(|w| w * r).collect());
     let own = reader.trace.origin.format == crate::trace::TraceFormat::Recording;
     AxisRecord {
+        trace: reader.trace.name.clone(),
         period_s: if finer { cycle_s } else { period_s },
         count: reader.times.len().div_ceil(every),
         velocity_command_lu_s: length("velocity_command").or_else(from_motor),

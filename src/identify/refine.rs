@@ -7,12 +7,14 @@
 //! r = [(τ - τ_sim)/σ_τ, (x - x_sim - zero)/σ_x]        J, B, Tc, g0 and, if no trace told them, Kp and Tn are free
 //! ```
 //! both behind the window of `motion`.
-//! The quantum of the scale is in the model, derivatives are differences over 2 % (a smaller step only sees which quantum is hit), and kvff and
+//! The quantum of the scale is in the model, derivatives are differences over 2 %, simulated without it (with it they
+//! show which quantum is hit, and the fit stops a tenth away from the gains of the speed loop), and kvff and
 //! d_pos are never free together: both come from the recorded wires or from the machine file. Where the simulated axis leaves clearly more
 //! over than the law of `friction`, its controllers are not those of the machine, and least squares stay.
 
+use super::feedforward::left_out;
 use super::friction::Mechanics;
-use super::motion::{filtered, half_window_rows, window};
+use super::motion::{filtered, half_window_rows, quantum, window};
 use super::normal::{Blocks, Solution};
 use super::record::AxisRecord;
 use super::wire::{AxisResult, Estimate, Means, Parameter, TorqueSource};
@@ -24,7 +26,9 @@ use crate::machine::{Axis, DriveData, Machine};
 /// Relative step of the differences.
 const STEP_SHARE: f64 = 0.02;
 /// Passes at most.
-const PASSES: usize = 8;
+const PASSES: usize = 12;
+/// Share of its interval that a value may still have to go.
+const ARRIVED_SHARE: f64 = 0.1;
 /// Rows of all records at most: a minute at 1 ms.
 const ROWS_MAX: usize = 60_000;
 /// The simulated axis may leave this much more over than the law does.
@@ -65,15 +69,19 @@ pub(super) fn refine(
     start: &Mechanics,
     result: &mut AxisResult,
 ) -> Option<Vec<Estimate>> {
-    let at_rest: Option<Vec<AxisRecord>> =
-        records.iter().map(|record| Some(record.simulated_from(rest_row(record)?))).collect();
-    if let Some(reason) = unfit(records, at_rest.as_deref(), machine, known, start) {
+    let cycle_s = machine.cycle.time_base.seconds(known.position_cycle_ticks);
+    let (fit, reasons) = fit_to_simulate(records, cycle_s);
+    let why = no_start(start).or(if fit.is_empty() { reasons.first().map(|(_, reason)| *reason) } else { None });
+    if let Some(reason) = why {
         if !start.estimates.is_empty() {
             result.verdicts.push(format!("no output-error refinement: {reason}"));
         }
         return None;
     }
-    let records = at_rest.as_deref()?;
+    for (record, reason) in reasons {
+        left_out(std::slice::from_ref(record), reason, "the output-error refinement", result);
+    }
+    let records = fit.as_slice();
     let free = free_parameters(result, start);
     let mut data = known.clone();
     set(&mut data, &start.estimates.iter().map(|e| (e.parameter, e.value)).collect::<Vec<_>>());
@@ -99,39 +107,38 @@ pub(super) fn refine(
     Some(problem.estimates(&solution, start, result))
 }
 
-/// Why no simulation can be held against these traces.
-fn unfit(
-    records: &[AxisRecord],
-    at_rest: Option<&[AxisRecord]>,
-    machine: &Machine,
-    data: &DriveData,
-    start: &Mechanics,
-) -> Option<&'static str> {
-    let cycle_s = machine.cycle.time_base.seconds(data.position_cycle_ticks);
+/// Why there is nothing to start a simulation from.
+fn no_start(start: &Mechanics) -> Option<&'static str> {
     if start.value(Parameter::Inertia).is_none() || start.value(Parameter::Coulomb).is_none() {
         return Some("inertia or Coulomb friction is missing to start from");
     }
-    if start.misfit {
-        return Some(
-            "the trace does not follow the model of a rigid axis with Coulomb and viscous friction closely enough",
-        );
+    start.misfit.then_some(
+        "the trace does not follow the model of a rigid axis with Coulomb and viscous friction closely enough",
+    )
+}
+
+/// The records that a simulation can be held against, from their rest on, and why the others cannot.
+fn fit_to_simulate(records: &[AxisRecord], cycle_s: f64) -> (Vec<AxisRecord>, Vec<(&AxisRecord, &'static str)>) {
+    let (mut fit, mut reasons, mut rows) = (Vec::new(), Vec::new(), 0);
+    for record in records {
+        let complete = record.setpoint_lu.is_some() && record.position_lu.is_some() && record.torque.is_some();
+        let rest = rest_row(record);
+        let reason = if !complete {
+            "set-point, position and torque are not in the trace"
+        } else if (record.period_s / cycle_s - 1.0).abs() > 1e-3 {
+            "the trace is not at the position cycle"
+        } else if rows + record.count > ROWS_MAX {
+            "the traces are longer than a minute at 1 ms"
+        } else if let Some(row) = rest {
+            rows += record.count;
+            fit.push(record.simulated_from(row));
+            continue;
+        } else {
+            "the trace has no rest of 0.2 s to start a simulation from, or has gaps behind it"
+        };
+        reasons.push((record, reason));
     }
-    if records
-        .iter()
-        .any(|record| record.setpoint_lu.is_none() || record.position_lu.is_none() || record.torque.is_none())
-    {
-        return Some("set-point, position and torque are not in every trace");
-    }
-    if records.iter().any(|record| (record.period_s / cycle_s - 1.0).abs() > 1e-3) {
-        return Some("the trace is not at the position cycle");
-    }
-    if records.iter().map(|record| record.count).sum::<usize>() > ROWS_MAX {
-        return Some("the traces are longer than a minute at 1 ms");
-    }
-    if at_rest.is_none() {
-        return Some("a trace has no rest of 0.2 s to start a simulation from, or has gaps behind it");
-    }
-    None
+    (fit, reasons)
 }
 
 /// The row from which a simulation can begin: the first one where the trace begins at rest, else one in the first rest that is long enough for the
@@ -202,18 +209,6 @@ fn set(data: &mut DriveData, values: &[(Parameter, f64)]) {
     }
 }
 
-/// The step of a scale, if the positions stand on one.
-fn quantum(position: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = position.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|s| *s > 1e-9).collect();
-    steps.sort_by(f64::total_cmp);
-    let least = *steps.get(steps.len() / 100)?;
-    let near =
-        |step: &&f64| ((**step / least) - (**step / least).round()).abs() < 0.01 * (**step / least).max(1.0).sqrt();
-    let whole = steps.iter().filter(|step| **step < 50.0 * least).filter(near).count();
-    let looked_at = steps.iter().filter(|step| **step < 50.0 * least).count();
-    (looked_at > 20 && whole as f64 > 0.98 * looked_at as f64 && least > 1e-7).then_some(least)
-}
-
 impl Problem<'_> {
     /// Simulates all records; `None` where the axis leaves all bounds.
     fn residuals(&self, data: &DriveData) -> Option<Vec<Residuals>> {
@@ -270,6 +265,9 @@ impl Problem<'_> {
 
     /// Normal equations at the present values.
     fn linearised(&self, base: &[Residuals], sizes: (f64, f64)) -> Option<Blocks> {
+        let mut smooth = self.data.clone();
+        smooth.encoder.position_resolution_lu = 0.0;
+        let ideal = self.residuals(&smooth)?;
         let mut columns = Vec::new();
         for parameter in &self.free {
             let value = get(&self.data, *parameter);
@@ -278,7 +276,7 @@ impl Problem<'_> {
                 _ => 0.0,
             };
             let step = (STEP_SHARE * value.abs()).max(floor);
-            let mut moved = self.data.clone();
+            let mut moved = smooth.clone();
             set(&mut moved, &[(*parameter, value + step)]);
             columns.push((step, self.residuals(&moved)?));
         }
@@ -289,7 +287,7 @@ impl Problem<'_> {
                 let mut push = |of: fn(&Residuals) -> &Vec<f64>, size: f64| {
                     let y = of(&base[place])[k] / size;
                     let slope = |(step, moved): &(f64, Vec<Residuals>)| {
-                        (of(&base[place])[k] - of(&moved[place])[k]) / step / size
+                        (of(&ideal[place])[k] - of(&moved[place])[k]) / step / size
                     };
                     let row: Vec<f64> = columns.iter().map(slope).collect();
                     if y.is_finite() && row.iter().all(|value| value.is_finite()) {
@@ -313,17 +311,18 @@ impl Problem<'_> {
     /// Passes until nothing changes; the last linearisation and the torque left over.
     fn solve(&mut self) -> Option<(Solution, f64)> {
         let mut base = self.residuals(&self.data)?;
-        let sizes = self.sizes(&base);
-        let cost = |residuals: &[Residuals]| -> f64 {
+        let cost = |residuals: &[Residuals], sizes: (f64, f64)| -> f64 {
             let square = |values: &[f64], size: f64| {
                 values.iter().filter(|v| v.is_finite()).map(|v| (v / size).powi(2)).sum::<f64>()
             };
             residuals.iter().map(|r| square(&r.torque, sizes.0) + square(&r.position, sizes.1)).sum()
         };
         let columns: Vec<usize> = (0..self.free.len()).collect();
-        let mut last = self.linearised(&base, sizes)?.solve(&columns)?;
+        let mut last = self.linearised(&base, self.sizes(&base))?.solve(&columns)?;
         for _ in 0..PASSES {
-            let before = cost(&base);
+            // Weights are those of the present residuals: at the start a wrong gain is most of them.
+            let sizes = self.sizes(&base);
+            let before = cost(&base, sizes);
             let mut share = 1.0;
             let mut moved = None;
             // Half the step until it helps.
@@ -339,14 +338,18 @@ impl Problem<'_> {
                     .iter()
                     .all(|(p, value)| matches!(p, Parameter::Gravity | Parameter::Viscous) || *value > 0.0);
                 set(&mut data, &values);
-                moved =
-                    possible.then(|| self.residuals(&data)).flatten().filter(|r| cost(r) < before).map(|r| (data, r));
+                moved = possible
+                    .then(|| self.residuals(&data))
+                    .flatten()
+                    .filter(|r| cost(r, sizes) < before)
+                    .map(|r| (data, r));
                 share /= 2.0;
             }
             let Some((data, residuals)) = moved else { break };
             (self.data, base) = (data, residuals);
-            last = self.linearised(&base, sizes)?.solve(&columns)?;
-            if before - cost(&base) < 1e-4 * before {
+            last = self.linearised(&base, self.sizes(&base))?.solve(&columns)?;
+            // What is left to go is little beside what is not known.
+            if columns.iter().all(|j| last.theta[*j].abs() < ARRIVED_SHARE * last.value(*j).1) {
                 break;
             }
         }
@@ -366,7 +369,9 @@ impl Problem<'_> {
             // Gravity may be 0: dry friction is the size of it.
             let size = if *parameter == Parameter::Gravity { self.data.mechanics.coulomb_friction_n_m } else { value };
             let half = noise.hypot(GRAIN_SHARE * size) + solution.theta[j].abs();
-            let estimate = Estimate::around(*parameter, value, half, Means::OutputError);
+            // The simulated axis has the same law, and lacks the same terms.
+            let room = start.room.iter().find(|(known, _)| known == parameter).map_or([0.0; 2], |(_, room)| *room);
+            let estimate = Estimate::around(*parameter, value, half, Means::OutputError).reaching(room);
             match (parameter, first) {
                 (_, Some(first)) if half > first.half() => found.push(*first),
                 (Parameter::SpeedGain | Parameter::SpeedResetTime, _) => {

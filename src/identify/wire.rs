@@ -181,6 +181,11 @@ impl Estimate {
         Self { low: self.low - by, high: self.high + by, ..self }
     }
 
+    /// The interval made wider by so much downwards and upwards.
+    pub(super) fn reaching(self, [down, up]: [f64; 2]) -> Self {
+        Self { low: self.low - down, high: self.high + up, ..self }
+    }
+
     /// Half of the width of the interval.
     pub(super) fn half(&self) -> f64 {
         (self.high - self.low) / 2.0

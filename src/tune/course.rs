@@ -3,13 +3,15 @@
 //! In: a program (through the kernel, without drives, once), or a trace with set-points and a measured error. Out: [`Course`]. Exact stops do
 //! not wait for the axes here: the set-points depend on no gain. Of a long program the first [`COURSE_MAX_S`] count.
 
-use crate::base::units::{MS_PER_S, rad_from_deg};
+use crate::base::units::{MS_PER_S, RAD_PER_REV, deg_from_rad, rad_from_deg};
 use crate::base::{AxisId, AxisKind, Diagnostic, MachinePoint, PerAxis};
+use crate::identify::unwrap;
 use crate::interpolator::{AxisSetpoint, FineInterpolator};
 use crate::interpreter::Setup;
 use crate::kernel::{Kernel, Status};
-use crate::machine::Machine;
+use crate::machine::{Axis, Machine};
 use crate::trace::{Method, Signal, Trace, Zero};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Longest course: gains need reversals and accelerations, not hours.
@@ -209,17 +211,26 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
         let ratio = (machine.cycle.time_base.ticks_per_setpoint() / data.position_cycle_ticks.max(1)).max(1);
         let cycle_s = period_s / ratio as f64;
         let times: Vec<f64> = (0..=steps as usize * ratio as usize).map(|k| start_s + k as f64 * cycle_s).collect();
-        let mut course =
-            axis_course(*axis, ratio as usize, resampled(signal, &times, machine.axis(*axis).kind, &trace.name)?);
+        let of_axis = machine.axis(*axis);
+        let setpoints = resampled(&going_on(signal, of_axis), &times, of_axis.kind, &trace.name)?;
+        let mut course = axis_course(*axis, ratio as usize, setpoints);
         if let Some((stem, signal)) = errors(*axis) {
-            let values = resampled(signal, &times, machine.axis(*axis).kind, &trace.name)?;
+            let is_position = stem.starts_with("position_");
+            let going_on = if is_position { going_on(signal, of_axis) } else { Cow::Borrowed(signal) };
+            let values = resampled(&going_on, &times, of_axis.kind, &trace.name)?;
             course.measured_lu = Some(match stem {
                 "control_deviation" => Measured::Deviation(values),
                 "following_error" => Measured::Following(values),
                 _ => {
                     course.own_zero = signal.meaning.zero == Zero::Encoder;
                     let lag = course.positions_lu.iter().zip(&values).map(|(sent, actual)| sent - actual);
-                    Measured::Following(lag.collect())
+                    let mut lag: Vec<f64> = lag.collect();
+                    if of_axis.modulo {
+                        // The two may have begun on either side of 360 deg.
+                        let apart = lag.first().map_or(0.0, |first| (first / RAD_PER_REV).round() * RAD_PER_REV);
+                        lag.iter_mut().for_each(|lag| *lag -= apart);
+                    }
+                    Measured::Following(lag)
                 }
             });
         }
@@ -247,6 +258,16 @@ pub fn course_of_trace(trace: &Trace, machine: &Machine, validates: bool) -> Res
     let row_times: Vec<f64> = (0..rows).map(|k| start_s + k as f64 * period_s).collect();
     let active = switched(machine, &axes, feedforward, &row_times);
     Ok(Course { name, validates, measured: true, duration_s: steps * period_s, warnings, axes, postures, active })
+}
+
+/// Positions of a modulo axis go on behind 360 deg, so that samples between two of a trace are not those of a turn back.
+fn going_on<'t>(signal: &'t Signal, axis: &Axis) -> Cow<'t, Signal> {
+    if !axis.modulo {
+        return Cow::Borrowed(signal);
+    }
+    let mut signal = signal.clone();
+    unwrap(&mut signal.values, deg_from_rad(RAD_PER_REV));
+    Cow::Owned(signal)
 }
 
 /// Feed-forward at every row, as a recorded velocity feed-forward tells while axes move; on where none does. At rest nothing tells: it is as

@@ -38,7 +38,8 @@ fn allowed(parameter: Parameter, truth: f64, coulomb: f64) -> f64 {
         Parameter::Coulomb => 0.005 * truth,
         Parameter::Viscous => 0.03 * truth,
         Parameter::SetpointDelay => 0.1,
-        Parameter::Gravity | Parameter::GravitySin | Parameter::GravityCos => 0.01 * coulomb.max(truth.abs()),
+        // Of a rotary axis these are three numbers, known on such a motion to 1 % of the Coulomb friction: three standard errors.
+        Parameter::Gravity | Parameter::GravitySin | Parameter::GravityCos => 0.03 * coulomb.max(truth.abs()),
         _ => 0.001 * truth.max(1e-3),
     }
 }

@@ -158,3 +158,63 @@ fn a_machine_file_keeps_comments_and_order() {
     assert!(line.contains("identified, 95 %:") && line.contains("was 0.0085"), "{line}");
     assert!(written.contains("identified = true"));
 }
+
+/// A trace of X of the Spinner under a name.
+fn named(name: &str, legs: &[(f64, f64, f64)], stems: &[&str]) -> sollwert::trace::Trace {
+    let machine = machine("spinner_mvc850", &[]);
+    let axis = machine.axis(machine.axis_by_name("X").unwrap());
+    let signals = simulate(axis, &machine.cycle.time_base, &moves(1e-3, legs), 1e-3);
+    sollwert::trace::Trace { name: name.to_owned(), ..trace(axis, 1e-3, &signals, stems, Noise::usual(7)) }
+}
+
+#[test]
+fn unfit_traces_beside_a_good_one_are_left_out_and_said() {
+    let machine = machine("spinner_mvc850", &[]);
+    let good = named("good", &legs(), &ALL);
+    let by = |traces: &[sollwert::trace::Trace]| {
+        identify(traces, &machine, &IdentifyOptions::default(), &mut |_| {}).expect("one axis").remove(0)
+    };
+    let alone = by(std::slice::from_ref(&good));
+    let mut reversed = named("reversed", &legs(), &ALL);
+    for signal in reversed.signals.iter_mut().filter(|signal| signal.original.contains("current")) {
+        signal.values.iter_mut().for_each(|value| *value = -*value);
+    }
+    let mut coarse = named("coarse", &legs(), &["position_setpoint", "position_measured", "current"]);
+    for signal in &mut coarse.signals {
+        signal.values = signal.values.iter().step_by(5).copied().collect();
+        let count = signal.values.len();
+        signal.times = sollwert::trace::TimeGrid::Uniform { start_ns: 0.0, step_ns: 5e6, count };
+    }
+    let blind = named("blind", &legs(), &["position_setpoint", "position_measured"]);
+    let mut off = named("off", &legs(), &ALL);
+    for signal in off.signals.iter_mut().filter(|signal| signal.original.contains("feedforward")) {
+        signal.values.iter_mut().for_each(|value| *value = 0.0);
+    }
+    off.signals.retain(|signal| !signal.original.contains("velocity_command"));
+    let found = by(&[reversed, coarse, blind, good, off]);
+    for parameter in Parameter::ALL {
+        let [alone, beside] = [&alone, &found].map(|result| result.estimate(parameter).copied());
+        assert_eq!(alone.is_some(), beside.is_some(), "{parameter:?}: {:?}", found.refusals);
+        if let (Some(alone), Some(beside)) = (alone, beside) {
+            let room = (alone.high - alone.low).max(1e-6 * alone.value.abs()).max(1e-4);
+            assert!((alone.value - beside.value).abs() < room, "{parameter:?}: {alone:?}, beside others {beside:?}");
+        }
+    }
+    for (name, of) in [
+        ("reversed", "the mechanics"),
+        ("coarse", "the mechanics"),
+        ("coarse", "its controllers"),
+        ("blind", "the mechanics"),
+    ] {
+        let said = |verdict: &&String| verdict.starts_with(&format!("`{name}` is left out for {of}"));
+        assert!(found.verdicts.iter().any(|verdict| said(&verdict)), "{name} {of}: {:?}", found.verdicts);
+    }
+}
+
+#[test]
+fn a_viscous_friction_of_nothing_is_a_value() {
+    let result = of(&legs(), &ALL, &["axes.X.mechanics.viscous_friction_n_m_s_per_rad=0"]);
+    let viscous = result.estimate(Parameter::Viscous).unwrap_or_else(|| panic!("{:?}", result.refusals));
+    assert!((viscous.low..=viscous.high).contains(&0.0), "{viscous:?}");
+    assert!(viscous.value >= 0.0 && viscous.high < 5e-4, "{viscous:?}");
+}

@@ -1,4 +1,5 @@
-//! On synthetic traces with 1 um scale, 0.05 A current noise and 0.02 A quantum the values are right and the intervals hold.
+//! On synthetic traces with 1 um scale, 0.05 A current noise and 0.02 A quantum the values are right and the intervals hold,
+//! from a machine file that is wrong in all of them.
 //!
 //! `IDENTIFY_REPETITIONS=200 cargo test --release --test identify` is the nightly run; fewer repetitions always run.
 
@@ -13,6 +14,19 @@ pub const SETS: &[&str] = &[
     "axes.X.drive.setpoint_delay_ms=1.37",
     "axes.X.drive.feedforward_delay_ms=0.45",
     "axes.X.mechanics.gravity_n_m=0.35",
+];
+/// The machine file that the identification starts from: wrong in all that it is to find. Torque constant, transmission, cycles, current loop and the inertia of
+/// the feed-forward are what is taken as known.
+const START: &[&str] = &[
+    "axes.X.mechanics.inertia_kg_m2=0.013",
+    "axes.X.mechanics.viscous_friction_n_m_s_per_rad=0.004",
+    "axes.X.mechanics.coulomb_friction_n_m=0.9",
+    "axes.X.drive.position_gain_per_s=35",
+    "axes.X.drive.velocity_feedforward=1.0",
+    "axes.X.drive.torque_feedforward=0",
+    "axes.X.drive.setpoint_delay_ms=0.4",
+    "axes.X.drive.speed_gain_n_m_s_per_rad=1.5",
+    "axes.X.drive.speed_reset_time_ms=14",
 ];
 /// Truth, and the share (the delay: ms) within which it is to be found.
 const TRUTH: [(Parameter, f64, f64); 9] = [
@@ -38,7 +52,8 @@ fn repetition(seed: u64, linear_only: bool) -> AxisResult {
     let signals = simulate(axis, &machine.cycle.time_base, &x, noise.scale_lu);
     let trace = trace(axis, 1e-3, &signals, &ALL, noise);
     let options = IdentifyOptions { axes: Vec::new(), linear_only };
-    identify(&[trace], &machine, &options, &mut |_| {}).expect("a trace with one axis").remove(0)
+    let start = crate::made::machine("spinner_mvc850", START);
+    identify(&[trace], &start, &options, &mut |_| {}).expect("a trace with one axis").remove(0)
 }
 
 #[test]
@@ -107,8 +122,9 @@ fn intervals_contain_the_truth() {
         assert_eq!(*given, repetitions, "{parameter:?}");
         let share = *inside as f64 / *given as f64;
         assert!(share >= least_share(repetitions), "{parameter:?}: the interval holds in {inside} of {given}");
-        // 95 % of a normal error are 2 of its RMS, of a dozen stretches 2.2, and the RMS of 30 errors is known to a quarter.
-        assert!((1.5..4.0).contains(ratio), "{parameter:?}: the half width is {ratio:.2} times the RMS error");
+        // 95 % of a normal error are 2 of its RMS, of a dozen stretches 2.2; to the side of friction that falls with speed the interval is that of a fit
+        // with one more column, which on these legs knows Coulomb friction 4.6 times less (2.2 (1 + 4.6) / 2 = 6.2); the RMS of 30 errors is known to a quarter.
+        assert!((1.5..8.0).contains(ratio), "{parameter:?}: the half width is {ratio:.2} times the RMS error");
     }
     // An interval that always holds is too wide: not all of them may.
     let all: u64 = counts.iter().map(|(_, inside, _)| inside).sum();

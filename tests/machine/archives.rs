@@ -413,6 +413,22 @@ fn a_kinematic_chain_is_said_once() {
     );
     let about = imported.warnings.iter().filter(|warning| warning.message.contains("$NK_")).count();
     assert_eq!(about, 1);
+    // Each datum is listed.
+    for datum in ["$NK_NAME", "$NK_NEXT", "$NK_OFF_DIR", "$NT_NAME"] {
+        assert!(imported.unknown.iter().any(|unknown| unknown.datum.ends_with(datum)), "{:?}", imported.unknown);
+    }
+}
+
+#[test]
+fn data_of_transformations_that_turn_no_tool_are_listed_one_by_one() {
+    let text = "$MC_TRAFO_TYPE_1=256\n$MC_TRAFO_TYPE_2=1024\n$MC_TRANSMIT_ROT_AX_OFFSET_1=30\n$MC_TRANSMIT_BASE_TOOL_1[0]=0\n$MC_TRAANG_ANGLE_2=45\n";
+    let imported = import(&format!("{PLAIN}{text}"));
+    assert!(said(&imported, "$MC_TRAFO_TYPE_1 = 256 (TRANSMIT)"), "{:?}", imported.warnings);
+    assert!(said(&imported, "$MC_TRAFO_TYPE_2 = 1024 (TRAANG)"), "{:?}", imported.warnings);
+    for datum in ["TRANSMIT_ROT_AX_OFFSET_1", "TRANSMIT_BASE_TOOL_1", "TRAANG_ANGLE_2"] {
+        let listed = imported.unknown.iter().any(|unknown| unknown.datum.contains(datum) && unknown.count == 1);
+        assert!(listed, "{datum}: {:?}", imported.unknown);
+    }
 }
 
 /// A zip with stored members.

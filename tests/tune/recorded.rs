@@ -10,7 +10,7 @@ const PROGRAM: &str = "SOFT\nG1 X40 F9000\nX0\nX25 F4000\nX-5\nX0 F12000\nM30\n"
 
 #[test]
 fn gains_of_the_machine_outside_the_usual_bounds_may_stay_and_outside_those_of_the_user_not() {
-    // A delay of 6 ms where the usual bounds end at 4: nothing else may change, so that 6 stays or 0..4 is proposed, never "kept" as 4.
+    // No feed-forward at all, where the usual bounds begin at a half: 0 stays, or a half and more is proposed, never "kept" as a half.
     let sets = ["axes.X.drive.velocity_feedforward=0", "axes.X.drive.torque_feedforward=0"];
     let loaded = machine(&sets);
     let of = |bounds: Vec<(Gain, [f64; 2])>| {
@@ -92,5 +92,54 @@ fn a_late_encoder_with_a_zero_of_its_own_gives_the_gains_of_the_actual_position(
     let of_encoder = gains(encoder);
     for (one, other) in plain.iter().zip(of_encoder) {
         assert!((one - other).abs() < 2e-3, "{plain:?} {of_encoder:?}");
+    }
+}
+
+#[test]
+fn a_delay_above_the_usual_bounds_stays_where_nothing_is_better_and_goes_where_it_is_wrong() {
+    // The usual bounds end at 4 ms.
+    let sets = ["X", "Y", "Z"].map(|axis| format!("axes.{axis}.drive.setpoint_delay_ms=6"));
+    let loaded = machine(&sets.each_ref().map(String::as_str));
+    let of = |text: &str, bounds: Vec<(Gain, [f64; 2])>| {
+        let options = TuneOptions { gains: vec![Gain::Delay], bounds, ..TuneOptions::default() };
+        tuned(&loaded, vec![course(&loaded, "t.mpf", text, false)], &options)
+    };
+    let slow = of("G1 X0.0002 F1\nX0\nM30\n", Vec::new());
+    assert_eq!(gain(&slow, "X", Gain::Delay), 6.0, "{:?}", slow.warnings);
+    assert!(slow.warnings.iter().any(|warning| warning.code == "U0003"), "{:?}", slow.warnings);
+    let fast = of(PROGRAM, Vec::new());
+    assert!((gain(&fast, "X", Gain::Delay) - 1.0).abs() < 0.15, "{:?}", fast.axes[0].gains);
+    let bounded = of("G1 X0.0002 F1\nX0\nM30\n", vec![(Gain::Delay, [0.0, 4.0])]);
+    assert!(gain(&bounded, "X", Gain::Delay) <= 4.0, "{:?}", bounded.axes[0].gains);
+}
+
+#[test]
+fn a_trace_of_a_modulo_axis_that_passes_360_deg_tunes_as_one_that_does_not() {
+    let loaded = sollwert::machine::load("mikron_ucp710", &[]).unwrap();
+    let c = loaded.machine.axis_by_name("C").unwrap();
+    assert!(loaded.machine.axis(c).modulo, "the round table goes round");
+    let positions = setpoints(&loaded, "G1 C=IC(250) F8000\nC=IC(300)\nC=IC(-200)\nM30\n", c);
+    let mut drive =
+        AxisDrive::new(loaded.machine.axis(c), &loaded.machine.cycle.time_base, Start::Held, positions[0]).unwrap();
+    let step = |position: &f64| {
+        drive.step(DriveInput { position_setpoint_lu: *position, load_n_m: 0.0, feedforward_active: true })
+    };
+    let actual: Vec<f64> = positions.iter().map(step).map(|signals| signals.position_measured_lu).collect();
+    let cycle_s =
+        loaded.machine.cycle.time_base.seconds(loaded.machine.axis(c).drive.as_ref().unwrap().position_cycle_ticks);
+    let by = |shown: fn(f64) -> f64| {
+        let of = |values: &[f64]| values.iter().map(|rad| shown(rad.to_degrees())).collect::<Vec<f64>>();
+        let signals = vec![
+            signal("C.position_setpoint_deg", of(&positions), cycle_s),
+            signal("C.position_actual_deg", of(&actual), cycle_s),
+        ];
+        tuned(&loaded, vec![course_of_trace(&trace(signals), &loaded.machine, false).unwrap()], &TuneOptions::default())
+    };
+    let [on, round] = [by(|deg| deg), by(|deg| deg.rem_euclid(360.0))];
+    assert!(positions.iter().any(|rad| rad.to_degrees() > 400.0), "it passes 360 deg");
+    let key =
+        |found: &sollwert::tune::Tuned| [Gain::Velocity, Gain::Torque, Gain::Delay].map(|one| gain(found, "C", one));
+    for (one, other) in key(&on).into_iter().zip(key(&round)) {
+        assert!((one - other).abs() < 2e-3, "{:?} and {:?}", key(&on), key(&round));
     }
 }

@@ -136,36 +136,68 @@ fn without_friction_there_is_nothing_to_compensate() {
     assert!(after.rms < 0.3 * before.rms, "{after:?}, before {before:?}");
 }
 
-#[test]
-fn intervals_contain_what_many_programs_say() {
+/// Repetitions: 200 are seen with TUNE_REPETITIONS=200; every run has fewer.
+fn asked() -> Option<u64> {
+    std::env::var("TUNE_REPETITIONS").ok().and_then(|text| text.parse().ok())
+}
+
+/// How often the intervals of velocity, torque and delay hold what many programs say, of those gains that are called certain.
+fn held(options: &TuneOptions, axes: &[&str], repetitions: u64, many: u64) -> [(u64, u64); 3] {
     let loaded = machine(&[]);
-    let options = TuneOptions { axes: vec!["X".to_owned()], ..TuneOptions::default() };
     // Three random programs in one: some 3 s.
     let long = |seed: u64| {
         let text: String = (0..3).map(|part| random_program(3 * seed + part).replace("M30\n", "")).collect();
         course(&loaded, "t.mpf", &(text + "M30\n"), false)
     };
-    let truth = tuned(&loaded, (100..112).map(long).collect(), &options);
-    // 200 are seen with TUNE_REPETITIONS=200; every run has fewer.
-    let repetitions: u64 = std::env::var("TUNE_REPETITIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(50);
-    let mut inside = [0; 3];
+    // None of these is one of the repetitions.
+    let truth = tuned(&loaded, (1000..1000 + many).map(long).collect(), options);
+    let mut counts = [(0, 0); 3];
     for seed in 0..repetitions {
-        let found = tuned(&loaded, vec![long(seed)], &options);
-        for (place, kind) in [Gain::Velocity, Gain::Torque, Gain::Delay].into_iter().enumerate() {
-            let one = found.axes[0].gains.iter().find(|one| one.gain == kind).unwrap();
-            assert!(one.certain, "seed {seed}: {one:?}");
+        let found = tuned(&loaded, vec![long(seed)], options);
+        for (axis, (place, kind)) in axes.iter().flat_map(|axis| {
+            [Gain::Velocity, Gain::Torque, Gain::Delay].into_iter().enumerate().map(move |gain| (axis, gain))
+        }) {
+            let of_axis = found.axes.iter().find(|found| found.name == *axis).unwrap();
+            let one = of_axis.gains.iter().find(|one| one.gain == kind).unwrap();
             // What the others say is written with so many digits.
-            let (wanted, half) = (gain(&truth, "X", kind), if kind == Gain::Delay { 0.5e-3 } else { 0.5e-4 });
-            inside[place] += i32::from((one.low - half..=one.high + half).contains(&wanted));
+            let (wanted, half) = (gain(&truth, axis, kind), if kind == Gain::Delay { 0.5e-3 } else { 0.5e-4 });
+            counts[place].0 += u64::from(one.certain);
+            counts[place].1 += u64::from(one.certain && (one.low - half..=one.high + half).contains(&wanted));
         }
     }
-    let shares = inside.map(|inside| f64::from(inside) / repetitions as f64);
-    println!("{repetitions} repetitions: intervals of velocity, torque and delay hold the gain in {shares:?}");
-    // 95 % less three standard errors of the repetitions.
-    let least = 0.95 - 3.0 * (0.95 * 0.05 / repetitions as f64).sqrt();
-    assert!(shares.iter().all(|share| *share >= least), "{shares:?}, at least {least}");
-    let mean = shares.iter().sum::<f64>() / 3.0;
-    assert!((0.90..=0.99).contains(&mean), "{shares:?}");
+    println!("{:?}: velocity, torque, delay (certain, held) {counts:?} of {repetitions}", options.objective);
+    counts
+}
+
+/// Every one is at least 95 % less three standard errors of the repetitions.
+fn enough(counts: [(u64, u64); 3]) {
+    for (certain, held) in counts {
+        let of = certain as f64;
+        let least = 0.95 - 3.0 * (0.95 * 0.05 / of).sqrt();
+        assert!(held as f64 >= least * of, "{counts:?}, at least {least}");
+    }
+}
+
+#[test]
+fn intervals_contain_what_many_programs_say() {
+    let options = TuneOptions { axes: vec!["X".to_owned()], ..TuneOptions::default() };
+    let repetitions = asked().unwrap_or(24);
+    let many = if asked().is_some() { 48 } else { 24 };
+    let counts = held(&options, &["X"], repetitions, many);
+    assert!(counts.iter().all(|(certain, _)| *certain == repetitions), "{counts:?}");
+    enough(counts);
+    let mean = counts.iter().map(|(certain, held)| *held as f64 / *certain as f64).sum::<f64>() / 3.0;
+    assert!((0.90..=0.99).contains(&mean), "{counts:?}");
+}
+
+/// The common delay of two axes stands twice: both say the same. Nightly only.
+#[test]
+fn intervals_of_a_tuning_for_the_contour_contain_what_many_programs_say() {
+    let Some(repetitions) = asked().map(|asked| asked.div_ceil(2)) else { return };
+    let options = TuneOptions { objective: Objective::Contour, ..TuneOptions::default() };
+    let counts = held(&options, &["X", "Y"], repetitions, 24);
+    assert!(counts.iter().all(|(certain, _)| *certain > repetitions / 4), "{counts:?}");
+    enough(counts);
 }
 
 #[test]

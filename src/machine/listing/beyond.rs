@@ -119,7 +119,7 @@ pub(super) fn passed_over(draft: &mut Draft<'_>) {
         let message = format!(
             "a kinematic chain ({elements} data $NK_, {transformations} data $NT_) is not taken over: the machine is cartesian unless MD24100 ff. say more"
         );
-        let help = "write [kinematics] by hand: directions are $NK_OFF_DIR of the rotary axes, points the sum of the offsets before them";
+        let help = "write [kinematics] by hand: directions are $NK_OFF_DIR of the rotary axes, points the sum of the offsets before them; each datum is in the list of those without counterpart";
         draft.warnings.push(Diagnostic::warning("M0310", message).help(help));
     }
 }

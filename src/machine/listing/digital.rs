@@ -1,8 +1,9 @@
 //! Drive data of the 840D pl (SIMODRIVE 611D, `$MD_`) as the parameters of SINAMICS that mean the same.
 //!
 //! In: name of a datum and its value. Out: parameter, index, value in its unit. Cycles count in 31.25 µs, the integrator time of the current
-//! controller is in µs, all other units agree. Only MD1407 and MD1409 were seen in a source;
-//! the other numbers, names and units are from memory and unverified: no archive of such a control was at hand. Boot files (BOT), which are compiled, are not read. Band-stops (MD1210 ff.) and speed filters are left out.
+//! controller is in µs, all other units agree. MD1000 (cycle of the
+//! current controller), MD1401 (speed), MD1407 and MD1409 (ms; 0 is no integral part) were seen in descriptions of the 611D with these numbers, and MD1417, MD1418, MD1426,
+//! MD1428 in the form `$MD_`; the other numbers, all names of the table and the remaining units are from memory and unverified: no archive of such a control was at hand. Boot files (BOT), which are compiled, are not read. Band-stops (MD1210 ff.) and speed filters are left out.
 
 use crate::base::units::{MS_PER_S, US_PER_S};
 

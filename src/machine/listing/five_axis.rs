@@ -70,6 +70,17 @@ fn form(kind: u32) -> Option<(Form, Option<[char; 2]>)> {
     }
 }
 
+/// Transformations that turn no tool, by their type.
+fn other(kind: u32) -> &'static str {
+    match kind {
+        256 | 257 => " (TRANSMIT)",
+        512..=514 => " (TRACYL)",
+        1024 => " (TRAANG)",
+        8192 => " (TRACON)",
+        _ => "",
+    }
+}
+
 /// Takes over the first five-axis transformation; says what is left out.
 pub(super) fn import(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
     let nobody = [String::new()];
@@ -80,7 +91,7 @@ pub(super) fn import(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
             Some((kind, source)) if kind == f64::from(BY_CARRIER) || form(kind as u32).is_some() => {
                 five.push((place, kind as u32, source));
             }
-            Some((kind, source)) if kind != 0.0 => others.push(format!("{source} = {kind}")),
+            Some((kind, source)) if kind != 0.0 => others.push(format!("{source} = {kind}{}", other(kind as u32))),
             Some(_) => {
                 let fourth = draft.listing.number(Scope::Channel, &format!("TRAFO_AXES_IN_{place}"), &nobody, 3);
                 prepared |= fourth.is_some_and(|(axis, _)| axis > 0.0);
@@ -91,7 +102,9 @@ pub(super) fn import(draft: &mut Draft<'_>, axes: &[FoundAxis]) {
     let known = draft.values.contains_key("kinematics.type");
     if !others.is_empty() {
         let message = format!("{}: no five-axis transformation, left out", others.join(", "));
-        draft.warnings.push(Diagnostic::note("M0310", message).help("TRANSMIT, TRACYL and TRAANG are not simulated"));
+        draft.warnings.push(Diagnostic::note("M0310", message).help(
+            "TRANSMIT, TRACYL and TRAANG are not simulated; each of their data is in the list of those without counterpart",
+        ));
     }
     let Some((place, kind, source)) = five.first() else {
         if prepared && !known {
