@@ -76,35 +76,35 @@ impl Sums {
 
 impl Prediction {
     /// The gap at the end of the longest step.
-    pub fn gap_after(&self, gap: f64) -> f64 {
+    pub fn gap_after(&self, gap_ratio: f64) -> f64 {
         let [primal, dual] = [&self.primal, &self.dual].map(|lanes| 1.0 / lanes.iter().copied().fold(1.0, greater));
         let [by_slack, by_multiplier, by_both] = [&self.by_slack, &self.by_multiplier, &self.by_both].map(sum);
-        gap + primal * by_slack + dual * by_multiplier + primal * dual * by_both
+        gap_ratio + primal * by_slack + dual * by_multiplier + primal * dual * by_both
     }
 }
 
 impl Block {
     /// A limit in a lane.
-    pub fn set(&mut self, lane: usize, a: [f64; 3], bound: f64) {
-        for (lanes, a) in self.a.iter_mut().zip(a) {
+    pub fn set(&mut self, lane: usize, a_ratio: [f64; 3], bound_ratio: f64) {
+        for (lanes, a) in self.a.iter_mut().zip(a_ratio) {
             lanes[lane] = a;
         }
-        self.bound[lane] = bound;
+        self.bound[lane] = bound_ratio;
         self.multiplier[lane] = 1.0;
     }
 
     /// The control is this feedback of the state.
-    pub fn put_control(&mut self, feedback: [f64; 2]) {
+    pub fn put_control(&mut self, feedback_ratio: [f64; 2]) {
         for lane in 0..LANES {
             let control = std::mem::take(&mut self.a[2][lane]);
-            self.a[0][lane] += control * feedback[0];
-            self.a[1][lane] += control * feedback[1];
+            self.a[0][lane] += control * feedback_ratio[0];
+            self.a[1][lane] += control * feedback_ratio[1];
         }
     }
 
     /// The limit of a lane is so much wider.
-    pub fn loosen(&mut self, lane: usize, by: f64) {
-        self.bound[lane] += by * self.bound[lane].abs().min(1.0);
+    pub fn loosen(&mut self, lane: usize, by_ratio: f64) {
+        self.bound[lane] += by_ratio * self.bound[lane].abs().min(1.0);
     }
 
     /// Factor of the control, slack and multiplier of a lane.
@@ -113,11 +113,12 @@ impl Block {
     }
 
     /// Slacks at a point, `slack_min` at least, and multipliers of equal products with them.
-    pub fn begin(&mut self, state: &[f64; 2], control: f64, slack_min: f64, product: f64) {
+    pub fn begin(&mut self, state_ratio: &[f64; 2], control_ratio: f64, slack_min_ratio: f64, product_ratio: f64) {
         for lane in 0..LANES {
-            let along = self.a[0][lane] * state[0] + self.a[1][lane] * state[1] + self.a[2][lane] * control;
-            self.slack[lane] = (self.bound[lane] - along).max(slack_min);
-            self.multiplier[lane] *= product / self.slack[lane];
+            let along =
+                self.a[0][lane] * state_ratio[0] + self.a[1][lane] * state_ratio[1] + self.a[2][lane] * control_ratio;
+            self.slack[lane] = (self.bound[lane] - along).max(slack_min_ratio);
+            self.multiplier[lane] *= product_ratio / self.slack[lane];
         }
     }
 
@@ -126,9 +127,9 @@ impl Block {
     #[inline(always)]
     pub fn advance(
         &mut self,
-        step: f64,
-        state: &[f64; 2],
-        control: f64,
+        step_ratio: f64,
+        state_ratio: &[f64; 2],
+        control_ratio: f64,
         sums: &mut Sums,
         total: &mut Lanes,
         residual: &mut Lanes,
@@ -136,9 +137,10 @@ impl Block {
         let [a0, a1, a2] = &self.a;
         let Sums { force: [f0, f1, f2], hessian: [h00, h01, h11, h0u, h1u, huu] } = sums;
         for l in 0..LANES {
-            let slack = self.slack[l] + step * self.slack_step[l];
-            let multiplier = self.multiplier[l] + step * self.multiplier_step[l];
-            let missing = self.bound[l] - (a0[l] * state[0] + a1[l] * state[1] + a2[l] * control) - slack;
+            let slack = self.slack[l] + step_ratio * self.slack_step[l];
+            let multiplier = self.multiplier[l] + step_ratio * self.multiplier_step[l];
+            let missing =
+                self.bound[l] - (a0[l] * state_ratio[0] + a1[l] * state_ratio[1] + a2[l] * control_ratio) - slack;
             residual[l] = greater(residual[l], missing.abs());
             let product = slack * multiplier;
             total[l] += product;
@@ -168,8 +170,8 @@ impl Block {
     #[inline(always)]
     pub fn predict(
         &mut self,
-        state_step: &[f64; 2],
-        control_step: f64,
+        state_step_ratio: &[f64; 2],
+        control_step_ratio: f64,
         prediction: &mut Prediction,
         inward: &mut [Lanes; 3],
         correction: &mut [Lanes; 3],
@@ -178,7 +180,7 @@ impl Block {
         let ([i0, i1, i2], [c0, c1, c2]) = (inward, correction);
         let [a0, a1, a2] = &self.a;
         for l in 0..LANES {
-            let along = a0[l] * state_step[0] + a1[l] * state_step[1] + a2[l] * control_step;
+            let along = a0[l] * state_step_ratio[0] + a1[l] * state_step_ratio[1] + a2[l] * control_step_ratio;
             let slack_step = self.residual[l] - along;
             let inverse = self.multiplier[l] * self.inverse[l];
             let share = slack_step * inverse;
@@ -200,20 +202,28 @@ impl Block {
         }
     }
 
-    /// The corrected direction. `longest`: reciprocals of the steps at which the first slack and the first multiplier would vanish.
+    /// The corrected direction. `primal`, `dual`: reciprocals of the steps at which the first slack and the first multiplier would vanish.
     #[inline(always)]
-    pub fn correct(&mut self, affine: &[f64; 3], step: &[f64; 3], centring: f64, primal: &mut Lanes, dual: &mut Lanes) {
+    pub fn correct(
+        &mut self,
+        affine_ratio: &[f64; 3],
+        step_ratio: &[f64; 3],
+        centring_ratio: f64,
+        primal: &mut Lanes,
+        dual: &mut Lanes,
+    ) {
         let [a0, a1, a2] = &self.a;
         let along = |step: &[f64; 3]| each(|l| a0[l] * step[0] + a1[l] * step[1] + a2[l] * step[2]);
-        let (predicted, reached) = (along(affine), along(step));
+        let (predicted, reached) = (along(affine_ratio), along(step_ratio));
         let inverse = each(|l| self.multiplier[l] * self.inverse[l]);
         let predicted = each(|l| self.residual[l] - predicted[l]);
         let correction =
             each(|l| predicted[l] * (self.multiplier[l] + self.multiplier[l] * (predicted[l] * inverse[l])));
         let slack_step = each(|l| self.residual[l] - reached[l]);
         let share = each(|l| slack_step[l] * inverse[l]);
-        let multiplier_step =
-            each(|l| (centring + correction[l]) * inverse[l] - (self.multiplier[l] + self.multiplier[l] * share[l]));
+        let multiplier_step = each(|l| {
+            (centring_ratio + correction[l]) * inverse[l] - (self.multiplier[l] + self.multiplier[l] * share[l])
+        });
         *primal = each(|l| greater(primal[l], -share[l]));
         let dual_share = each(|l| multiplier_step[l] * (self.slack[l] * self.inverse[l]));
         *dual = each(|l| greater(dual[l], -dual_share[l]));
