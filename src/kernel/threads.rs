@@ -131,11 +131,10 @@ fn broke_down() -> Diagnostic {
     Diagnostic::error("K0005", message).help("please report this, with the program")
 }
 
-/// Blocks a message.
-const BATCH_STEPS: usize = 64;
+/// Blocks a message: few enough that what one thread has written the other still finds near its processor.
+const BATCH_STEPS: usize = 32;
 
 /// Blocks in order: how many of the pieces are theirs, and what they had to say, if anything.
-#[derive(Default)]
 struct Blocks {
     pieces: Vec<ContourPiece>,
     steps: Vec<(usize, Option<Box<Step>>)>,
@@ -157,7 +156,9 @@ impl ReadingThread {
         let (answers, told) = bounded(1);
         let worker = std::thread::Builder::new().name("reading".into()).spawn(move || {
             loop {
-                let mut batch = Blocks::default();
+                // As many pieces as blocks, or a blend between each two of them.
+                let (pieces, steps) = (Vec::with_capacity(2 * BATCH_STEPS), Vec::with_capacity(BATCH_STEPS));
+                let mut batch = Blocks { pieces, steps };
                 let (mut stops, mut ends) = (false, false);
                 while batch.steps.len() < BATCH_STEPS && !stops && !ends {
                     let known = batch.pieces.len();

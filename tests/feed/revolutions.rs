@@ -80,9 +80,8 @@ fn the_feed_follows_the_spindle_up_from_the_edge_of_its_tolerance() {
         let ramping = rows.iter().filter(|row| row.line == 3 && !row.waits && row.rpm < 5999.0).count();
         assert!(ramping > 450, "{law}: {ramping}");
         for (t, lead_mm) in &leads {
-            // Half a stretch of 0.8 %, and what the spindle gains while the feed changes from stretch to stretch: 27 mm/s by 0.8 % take 7.6 ms at
-            // 15 m/s³ and two thirds more with the reserves of planning, 20 rev/s² of 90 rev/s.
-            assert!((lead_mm / 0.3 - 1.0).abs() < 0.004 + 0.0127 * 20.0 / 90.0, "{law}: {t} s: {lead_mm}");
+            // Half a stretch of 0.8 %, and 20 ms for the start from rest, which `continuous` does not drive as quickly as can be: the spindle gains 20 of 92 rev/s in a second.
+            assert!((lead_mm / 0.3 - 1.0).abs() < 0.004 + 0.02 * 20.0 / 92.0, "{law}: {t} s: {lead_mm}");
         }
         // At full speed it is exact, to what the optimiser of `continuous` leaves of its feed.
         let (t, lead_mm) = leads[leads.len() - 1];
