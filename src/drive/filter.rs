@@ -38,7 +38,7 @@ impl Section {
         };
         let fixed_rad_s = RAD_PER_REV * fixed_hz;
         // s = k (1 - q)/(1 + q) with q = 1/z meets the continuous response at the frequency from which k is made.
-        let k_rad_s = fixed_rad_s / (fixed_rad_s * period_s / 2.0).tan();
+        let k_rad_s = fixed_rad_s / libm::tan(fixed_rad_s * period_s / 2.0);
         // (s/w)² + c s/w + 1, or c s/w + 1 for w = None (then w is the fixed frequency), times (1 + q)².
         let polynomial = |(frequency_hz, linear): (Option<f64>, f64)| -> [f64; 3] {
             let stretch = k_rad_s / (RAD_PER_REV * frequency_hz.unwrap_or(fixed_hz));

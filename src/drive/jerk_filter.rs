@@ -120,8 +120,8 @@ fn low_pass_weights(count: usize, cutoff_ratio: f64) -> Box<[f64]> {
     let weight = |i: usize| {
         let from_middle = i as f64 - middle;
         let x = TAU * cutoff_ratio * from_middle;
-        let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
-        let window = if count > 1 { 0.54 - 0.46 * (TAU * i as f64 / (count as f64 - 1.0)).cos() } else { 1.0 };
+        let sinc = if x == 0.0 { 1.0 } else { libm::sin(x) / x };
+        let window = if count > 1 { 0.54 - 0.46 * libm::cos(TAU * i as f64 / (count as f64 - 1.0)) } else { 1.0 };
         sinc * window
     };
     let sum: f64 = (0..count).map(weight).sum();

@@ -85,7 +85,7 @@ impl Plant {
             return g0;
         }
         // A rotary axis: the load position is the axis angle in rad.
-        let (sin, cos) = (self.mechanics.transmission_lu_per_rad * angle_rad).sin_cos();
+        let (sin, cos) = libm::sincos(self.mechanics.transmission_lu_per_rad * angle_rad);
         g0 + gs * sin + gc * cos
     }
 
@@ -222,7 +222,7 @@ impl Plant {
         // i(t) = i + (u/R - i)(1 - exp(-R t / L)) reaches (Tg ± Ts)/Kt at t.
         let border_a = (gravity_n_m + self.mechanics.breakaway_friction_n_m.copysign(excess_v)) / kt;
         let share = r * (border_a - state.current_a) / excess_v;
-        let held_s = -(-share).ln_1p() * l / r;
+        let held_s = -libm::log1p(-share) * l / r;
         if held_s.is_nan() { (limit_s, None) } else { (held_s.clamp(0.0, limit_s), Some(excess_v)) }
     }
 
@@ -273,7 +273,7 @@ impl Friction {
 /// (1 - exp(-R t / L)) / R.
 fn rest_gain_a_per_v(motor: &MotorData, duration_s: f64) -> f64 {
     let MotorData { resistance_ohm: r, inductance_h: l, .. } = *motor;
-    -(-r * duration_s / l).exp_m1() / r
+    -libm::expm1(-r * duration_s / l) / r
 }
 
 /// Motion in one direction with constant dry friction.

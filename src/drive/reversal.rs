@@ -48,7 +48,7 @@ impl Reversal {
             adaptation: options.friction_adaptation,
             period_s,
             velocity_before_lu_s: 0.0,
-            decay_ratio: (-period_s / options.friction_pulse_time_s).exp(),
+            decay_ratio: libm::exp(-period_s / options.friction_pulse_time_s),
             backlash_lu,
             direction: 0.0,
             pulse_lu_s: 0.0,

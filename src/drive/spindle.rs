@@ -56,7 +56,7 @@ impl SpindleLag {
         let m = (now.setpoint.speed_rad_s - before.setpoint.speed_rad_s) / h;
         let settled = |point: &SpindleSetpoint| point.angle_rad - t * point.speed_rad_s + t * t * m;
         let off = before.angle_actual_rad - settled(&before.setpoint);
-        let angle_actual_rad = settled(&now.setpoint) + off * (-h / t).exp();
+        let angle_actual_rad = settled(&now.setpoint) + off * libm::exp(-h / t);
         SpindleSignals { angle_actual_rad, speed_actual_rad_s: (now.setpoint.angle_rad - angle_actual_rad) / t, ..now }
     }
 }

@@ -85,7 +85,7 @@ pub fn follow(table: &SetpointTable, options: &FollowOptions<'_>) -> Result<Foll
     let summary = summary(machine, &follower.figures, rows, &warnings, alarm.as_ref());
     if let Some(mut recorder) = recorder {
         if let Some(alarm) = &alarm {
-            record_alarm(&mut recorder, Tick(rows.saturating_sub(1) as u64 * row_ticks(machine)), alarm);
+            record_alarm(&mut recorder, Tick(rows.saturating_sub(1) as u64 * row_ticks(machine)), None, alarm);
         }
         recorder.finish(&summary.to_string())?;
     }

@@ -7,6 +7,7 @@ use super::cycle::{AxisRow, CycleOutput};
 use crate::base::{Diagnostic, Tick, TimeBase};
 use crate::kinematics::ToolPose as Pose;
 use crate::machine::Machine;
+use crate::program::BlockRef;
 use crate::recorder::{EventRecord, Recorder, ToolPose};
 
 /// Distance of tool poses: 100 Hz.
@@ -80,9 +81,9 @@ pub(super) fn record_braking(
     recorder.check()
 }
 
-/// Records the alarm that ends the run, at the last tick that was executed.
-pub(super) fn record_alarm(recorder: &mut Recorder, tick: Tick, alarm: &Diagnostic) {
-    recorder.event(tick, None, alarm.into());
+/// Records the alarm that ends the run, at the last tick that was executed, and the block of a drive's alarm.
+pub(super) fn record_alarm(recorder: &mut Recorder, tick: Tick, block: Option<BlockRef>, alarm: &Diagnostic) {
+    recorder.event(tick, block, alarm.into());
 }
 
 fn record_rows(recorder: &mut Recorder, rows: &[AxisRow]) {

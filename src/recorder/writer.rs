@@ -7,7 +7,7 @@
 
 use super::batch::{Batch, Order, Record};
 use super::encode::{AxisEncoder, Precision, RunEncoder};
-use super::mcap_file::{AttachmentHead, Declarations, McapFile, RawChunk, RecordBytes};
+use super::mcap_file::{AttachmentHead, Declarations, McapFile, RawChunk, RecordBytes, ZstdTuning};
 use super::packing::{Packing, Piece, attach_program};
 use super::schema::{
     AXIS_TOPIC_PREFIX, EVENT, EVENT_TOPIC, LINEAR_AXIS, PATH, PATH_TOPIC, POSE_IN_FRAME, PROGRAMMED, PROGRAMMED_TOPIC,
@@ -85,15 +85,17 @@ impl RecordingWriter {
         setup: &RecordingSetup,
         fault: Fault,
     ) -> Result<Self, Diagnostic> {
-        let level = match setup.compression {
-            Compression::Zstd => Some(ZSTD_LEVEL as i32),
+        let packing = match setup.compression {
+            Compression::Zstd => {
+                Some(ZstdTuning { level: ZSTD_LEVEL as i32, whole_numbers: setup.mantissa_bits.is_none() })
+            }
             Compression::None => None,
         };
         let (topics, declarations) = topics(setup);
         let mut chunk = RawChunk::default();
         chunk.declare(&declarations.schemas);
         chunk.declare(&declarations.channels);
-        let prelude = McapFile::create(target, LIBRARY, level).and_then(|mut file| {
+        let prelude = McapFile::create(target, LIBRARY, packing).and_then(|mut file| {
             write_prelude(&mut file, setup)?;
             file.declare(declarations);
             Ok(file)
@@ -107,7 +109,7 @@ impl RecordingWriter {
         let signals = setup.signals.on(setup.machine);
         let axis_encoders = PerAxis::from_fn(|id| {
             let axis = setup.machine.axes.get(id.index())?;
-            Some(AxisEncoder::new(axis.kind, signals.fields(id).collect(), precision))
+            Some(AxisEncoder::new(axis.kind, signals.fields(id), precision))
         });
         Ok(Self {
             packing: Packing::start(file, name.clone(), fault.clone())?,

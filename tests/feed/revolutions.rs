@@ -80,8 +80,8 @@ fn the_feed_follows_the_spindle_up_from_the_edge_of_its_tolerance() {
         let ramping = rows.iter().filter(|row| row.line == 3 && !row.waits && row.rpm < 5999.0).count();
         assert!(ramping > 450, "{law}: {ramping}");
         for (t, lead_mm) in &leads {
-            // Half a stretch of 1 %, and a little for the change from stretch to stretch.
-            assert!((lead_mm / 0.3 - 1.0).abs() < 0.0085, "{law}: {t} s: {lead_mm}");
+            // Half a stretch of 0.8 %, and 20 ms for the start from rest, which `continuous` does not drive as quickly as can be: the spindle gains 20 of 92 rev/s in a second.
+            assert!((lead_mm / 0.3 - 1.0).abs() < 0.004 + 0.02 * 20.0 / 92.0, "{law}: {t} s: {lead_mm}");
         }
         // At full speed it is exact, to what the optimiser of `continuous` leaves of its feed.
         let (t, lead_mm) = leads[leads.len() - 1];
@@ -102,15 +102,16 @@ fn a_feed_that_starts_at_once_takes_the_turns_of_the_spindle() {
             assert!(!rows.iter().any(|row| row.waits), "{law}");
             // t = T/2 + turns / n: the ramp takes twice the time of its turns.
             let end_s = rows.iter().find(|row| row.x[0] > 20.0 - 1e-9).expect("the end").t;
-            let wanted_s = 2.5 / 2.0 + 20.0 / 0.2 / 50.0;
-            assert!((end_s - wanted_s).abs() < 0.1, "{law}: {end_s}, {wanted_s}");
-            // The ramp of the spindle is driven in stretches of one feed each: near its rest they are long for what is turned there, and the feed
-            // falls behind, never ahead.
-            let begin_s = rows.iter().find(|row| row.x[1] > 0.0).expect("a motion").t;
-            for (t, lead_mm) in leads(&rows, 2..=81, [0.25, 0.1]) {
-                let behind_share = if t - begin_s < 0.7 { 0.16 } else { 0.08 };
+            // At its end X comes to rest from 10 mm/s at 15 m/s³, which takes half of 2 sqrt(v/j) longer.
+            let wanted_s = 2.5 / 2.0 + 20.0 / 0.2 / 50.0 + (10.0_f64 / 15_000.0).sqrt();
+            assert!((end_s - wanted_s).abs() < 0.01, "{law}: {end_s}, {wanted_s}");
+            // A stretch has one feed: off by half of its change of speed, 0.4 %, or 2 cycles of the ramp near its rest, and by 2 cycles more at either end of its block,
+            // where it is up to 4 cycles longer. A cycle for when the path starts.
+            for (t, lead_mm) in leads(&rows, 2..=81, [0.05, 0.1]) {
+                let half_step_share = 0.004_f64.max(0.002 / t) + 0.004 / t;
+                let start_share = 0.001 / t;
                 let ratio = lead_mm / 0.2;
-                assert!(ratio > 1.0 - behind_share && ratio < 1.06, "{law}: {t} s: {lead_mm}");
+                assert!((ratio - 1.0).abs() < half_step_share + start_share, "{law}: {t} s: {lead_mm}");
             }
         }
     }
@@ -125,7 +126,7 @@ fn the_feed_follows_the_spindle_down() {
         let first = rows.iter().find(|row| row.line == 5 && row.x[1] > 0.0).expect("a motion");
         assert!((first.rpm - 3000.0).abs() < 5.0, "{first:?}");
         for (t, lead_mm) in leads(&rows, 5..=5, [0.1, 0.1]) {
-            assert!((lead_mm / 0.3 - 1.0).abs() < 0.03, "{law}: {t} s: {lead_mm}");
+            assert!((lead_mm / 0.3 - 1.0).abs() < 0.01, "{law}: {t} s: {lead_mm}");
         }
         // 3000 to 1200 takes 1.5 s and 52.5 turns: 15.75 mm; the rest at 6 mm/s. The ramps of the feed, 2 sqrt(v/j) long, lose half of their time
         // times their speed: at the start 15 mm/s, which is made up for at 6 mm/s, at the end 6 mm/s.

@@ -2,9 +2,11 @@
 
 use crate::runs::{machine, program, record, scratch};
 use sollwert::base::units::rpm_from_rad_s;
+use sollwert::feed::OverrideSchedule;
 use sollwert::interpreter::Setup;
-use sollwert::kernel::{Kernel, Status};
-use sollwert::recorder::{Content, Recording, axis_field};
+use sollwert::kernel::{Kernel, Preparation, RunOptions, Status, run};
+use sollwert::program::ProgramSource;
+use sollwert::recorder::{Content, Recording, SignalChoice, axis_field};
 use std::path::Path;
 
 /// Time, angle and speed of the spindle set-point, and the time of the alarm.
@@ -98,6 +100,42 @@ fn every_axis_brakes_on_its_ramp() {
     }
 }
 
+/// In a sub-program, found only at run time: its name and its line, in the place, the message, the figures and the event.
+#[test]
+fn an_alarm_in_a_sub_program_tells_its_file_and_line() {
+    let loaded = machine("spinner_mvc850", &["axes.X.drive.contour_monitoring_um=10"]);
+    let path = scratch("sub_program_alarm.mcap");
+    let main = scratch("alarm_main.mpf");
+    std::fs::write(&main, "G17 G90 G64\nG0 X0 Y0\nALARM_SUB\nG0 X0\nM30\n").unwrap();
+    std::fs::write(scratch("ALARM_SUB.SPF"), "; a comment\nG4 F0.1\n\n  G1 X100 F15000\nM17\n").unwrap();
+    let options = RunOptions {
+        machine: &loaded,
+        setup: ProgramSource::from_file(&main).unwrap().into(),
+        overrides: OverrideSchedule::none(),
+        drives: true,
+        recording: Some(&path),
+        mantissa_bits: None,
+        signals: SignalChoice::all(),
+        threads: 1,
+        pace_ratio: None,
+    };
+    let outcome = run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{error:?}"));
+    let alarm = outcome.alarm.expect("an alarm");
+    let place = alarm.place.as_ref().expect("a place");
+    assert_eq!((&*place.file, place.line, place.line_text.as_str()), ("ALARM_SUB.SPF", 4, "  G1 X100 F15000"));
+    assert!(
+        alarm.message.contains("line 4:") && alarm.message.ends_with("in the sub-program ALARM_SUB.SPF"),
+        "{alarm:?}"
+    );
+    let recording = Recording::open(&path).unwrap();
+    assert_eq!(recording.summary().unwrap()["alarm"]["line"], 4);
+    let events = recording.messages().unwrap().map(Result::unwrap).filter_map(|message| match message.content {
+        Content::Event(event) if event.kind.as_deref() == Some("alarm") => Some((event.program, event.line)),
+        _ => None,
+    });
+    assert_eq!(events.collect::<Vec<_>>(), [(Some("ALARM_SUB.SPF".to_owned()), Some(4))]);
+}
+
 /// After the alarm of an axis the spindle goes to rest with its own acceleration, and its angle with it.
 #[test]
 fn the_spindle_brakes_after_an_alarm() {
@@ -153,4 +191,61 @@ fn the_switch_of_the_spindle() {
     assert!((rpm - 600.0).abs() < 1e-9 && (feed_mm_s - 10.0).abs() < 1e-6, "{rpm}, {feed_mm_s}");
     let (rpm, feed_mm_s) = fastest(0.5, "S600 M3\nG4 F1\nOVR=50\nG1 Z-40 F600\nM30\n");
     assert!((rpm - 300.0).abs() < 1e-9 && (feed_mm_s - 5.0).abs() < 1e-6, "{rpm}, {feed_mm_s}");
+}
+
+/// The switch of the feed does not hold G63: at 0 % and at 50 % its block is driven as at 100 %; a line waits.
+#[test]
+fn the_switch_of_the_feed_leaves_g63_alone() {
+    let loaded = machine("spinner_mvc850", &["feed.time_law=continuous"]);
+    let positions = |switch: &str, text: &str| {
+        let overrides = OverrideSchedule::parse(switch).unwrap();
+        let preparation = Preparation::new(program(text), &loaded.machine).with_overrides(&overrides);
+        let mut kernel = Kernel::with_source(loaded.machine.clone().into(), preparation, false);
+        let mut positions = Vec::new();
+        while kernel.cycle().unwrap() == Status::Running {
+            positions.push(kernel.output().setpoint.unwrap().axes.as_slice()[2].position_lu);
+        }
+        assert!(kernel.take_findings().alarm.is_none());
+        positions
+    };
+    // 40 mm at 10 mm/s, from about 1 s on: the switch is turned within it.
+    let tapping = "S600 M3\nG4 F1\nG63 Z-40 F600\nM30\n";
+    let free = positions("0=100", tapping);
+    for switch in ["1.5=50,3=20", "1.5=0,9=100", "0.5=0,9=100"] {
+        let driven = positions(switch, tapping);
+        assert_eq!(driven.len(), free.len(), "{switch}");
+        assert!(driven.iter().zip(&free).all(|(a, b)| (a - b).abs() < 1e-9), "{switch}");
+    }
+    let line = "S600 M3\nG4 F1\nG1 Z-40 F600\nM30\n";
+    let held = positions("1.5=0,9=100", line);
+    assert!(held.len() > free.len() + 5000, "{} {}", held.len(), free.len());
+}
+
+/// The eight signals that people look at, of five axes that all move, at 1 ms with 36 bits: what one time round adds is less than 1 GB in an hour.
+#[test]
+fn an_hour_of_what_people_look_at_is_less_than_a_gigabyte() {
+    let cycles = ["X", "Y", "Z", "A", "C"].map(|axis| format!("axes.{axis}.drive.position_cycle_ms=1"));
+    let loaded = machine("mikron_ucp710", &cycles.each_ref().map(String::as_str));
+    let once = "G1 X60 Y20 Z-10 A-20 C40 F3000\nX-60 Y40 Z-20 A-5 C-40\nX0 Y-40 Z-5 A-30 C10\nX0 Y0 Z0 A0 C0\n";
+    let recorded = |times: usize| {
+        let path = scratch(&format!("usual_{times}.mcap"));
+        let options = RunOptions {
+            machine: &loaded,
+            setup: program(&format!("G17 G90 G64\n{}M30\n", once.repeat(times))).into(),
+            overrides: OverrideSchedule::none(),
+            drives: true,
+            recording: Some(&path),
+            mantissa_bits: Some(36),
+            signals: SignalChoice::parse("usual", &loaded.machine).unwrap(),
+            threads: 1,
+            pace_ratio: None,
+        };
+        let outcome = run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{error:?}"));
+        (std::fs::metadata(&path).unwrap().len() as f64, outcome.summary.cycle_time_s)
+    };
+    let (one, two) = (recorded(1), recorded(2));
+    let hour_bytes = (two.0 - one.0) / (two.1 - one.1) * 3600.0;
+    assert!(two.1 - one.1 > 4.0 && hour_bytes < 1e9, "{hour_bytes}");
+    // Not for want of messages.
+    assert!(hour_bytes > 0.5e9, "{hour_bytes}");
 }

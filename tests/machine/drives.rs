@@ -185,3 +185,15 @@ fn a_second_mass_that_is_as_good_as_rigid() {
         assert!(found.is_none_or(names_key), "{found:?}");
     }
 }
+
+/// Without a time for positioning a block that waits for an axis that never arrives would never end: an hour is the longest.
+#[test]
+fn nothing_waits_for_longer_than_an_hour() {
+    for (time, wanted_s) in [("250", 0.25), ("inf", 3600.0), ("1e12", 3600.0)] {
+        let set = format!("axes.X.drive.positioning_time_ms={time}");
+        let loaded = machine::parse(&SourceText::new("test.toml", EXAMPLE), &[set])
+            .unwrap_or_else(|found| panic!("{}", shown(&found)));
+        let drive = loaded.machine.axes[0].drive.as_ref().expect("a drive");
+        assert_eq!(drive.monitoring.positioning_time_s, wanted_s, "{time}");
+    }
+}

@@ -30,6 +30,11 @@ fn words_choose_signals() {
     assert_eq!(chosen("X.current,Y.*")[1].1.len(), 10, "Y is ideal: it has no motor");
     assert_eq!(chosen("C")[0].1.len(), AXIS_FIELD_COUNT);
     assert!(chosen("path,event,tool").is_empty());
+    // What people look at: eight fields, of an ideal axis those that it has.
+    let usual = chosen("Usual");
+    assert_eq!(usual.iter().map(|(_, fields)| fields.len()).collect::<Vec<_>>(), [8, 6, 8]);
+    assert!(usual[0].1.contains(&"current_a") && !usual[1].1.contains(&"current_a"));
+    assert_eq!(chosen("usual,X.voltage")[0].1.len(), 9);
 }
 
 #[test]

@@ -131,6 +131,8 @@ struct Course<'a> {
     phases: Vec<Phase>,
     /// After a change that could not be planned: how long to wait before the next attempt.
     retry_s: f64,
+    /// G63: no override acts on the front piece, 0 % neither.
+    fixed: bool,
 }
 
 impl<'a> Course<'a> {
@@ -141,8 +143,14 @@ impl<'a> Course<'a> {
         now_s: f64,
     ) -> Self {
         let watches = actions.any() || overrides.synchronised_ratio() != (1.0, false);
+        let fixed = path.contour.modes.programmed.as_ref().is_some_and(|limits| !limits.override_acts);
         let path = watches.then(|| path.clone());
-        Self { overrides, actions, path, now_s, phases: Vec::new(), retry_s: 0.0 }
+        Self { overrides, actions, path, now_s, phases: Vec::new(), retry_s: 0.0, fixed }
+    }
+
+    /// What acts on the front piece now.
+    fn override_ratio(&self) -> f64 {
+        if self.fixed { 1.0 } else { self.overrides.ratio() }
     }
 
     /// Synchronised actions look at the set-points of a law that begins at `begin_s`, up to the first one after which $AC_OVR changes or something else
@@ -170,7 +178,7 @@ impl<'a> Course<'a> {
 
     /// True if the path is now planned under another override than before.
     fn take_override(&mut self, continuous: &mut Continuous, window: &mut Window<'_>) -> bool {
-        let override_ratio = self.overrides.ratio();
+        let override_ratio = self.override_ratio();
         if continuous.override_ratio() == override_ratio {
             return false;
         }
@@ -187,7 +195,7 @@ impl<'a> Course<'a> {
         let near_end_s = NEAR_END_SHARE * self.overrides.setpoint_period_s();
         let (begin_s, mut at_s) = (self.now_s, 0.0);
         loop {
-            let waits = continuous.override_ratio() != self.overrides.ratio();
+            let waits = continuous.override_ratio() != self.override_ratio();
             let retry_s = if waits { self.retry_s } else { f64::INFINITY };
             let left_s = law.duration_s() - at_s;
             self.watch(law, begin_s, self.now_s + left_s.min(retry_s));
