@@ -1,7 +1,7 @@
 //! How certain gains are: 95 % intervals from the scatter of the courses.
 //!
 //! In: the affine model around the gains, block by block. Out: [`Certainty`] of every slot. Residuals are strongly correlated in time, so that
-//! blocks of time count, not samples: the gains are solved again without each block in turn (delete-a-group jackknife [Efron 1982]),
+//! blocks of time count, not samples: the gains are solved again without each pair of blocks in turn (delete-a-group jackknife [Efron 1982]),
 //! and the scatter of these gives the width, with the distance of what the affine models around the end and its neighbours predict: stick events
 //! make them differ. Few blocks tell most of a gain (accelerations, reversals): the degrees of freedom for Student's
 //! quantile are those of the blocks by what they weigh for that gain, so that a gain that two blocks tell is not called certain. The
@@ -10,7 +10,7 @@
 use super::fit::Point;
 use super::gains::Gains;
 use super::group::{Group, Slot};
-use super::normal::Step;
+use super::normal::{Block, Step};
 use crate::identify::student_t;
 use nalgebra::{DMatrix, DVector};
 
@@ -21,6 +21,26 @@ const FREEDOM_MIN: f64 = 2.0;
 
 /// Fewer blocks have no scatter.
 const BLOCKS_MIN: usize = 3;
+
+/// Blocks that are left out together: a move accelerates in one and brakes in the next, at one feed and in one direction, and says the same twice.
+const MOVE_BLOCKS: usize = 2;
+
+/// Neighbouring blocks as one.
+struct Together {
+    square: DMatrix<f64>,
+    slope: DVector<f64>,
+}
+
+impl Together {
+    fn of(blocks: &[Block], count: usize) -> Self {
+        let (mut square, mut slope) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        for block in blocks {
+            square += DMatrix::from_row_slice(count, count, &block.square);
+            slope += DVector::from_column_slice(&block.slope);
+        }
+        Self { square, slope }
+    }
+}
 
 /// 95 % interval of a slot, inside.
 #[derive(Clone, Copy, Debug)]
@@ -45,13 +65,12 @@ pub(super) fn certainty(group: &Group<'_>, point: &Point, theory: &[Gains]) -> V
     let Some(inverse) = scaled_inverse(&curve).filter(|_| normal.blocks.len() >= BLOCKS_MIN) else { return untold() };
     let slope = DVector::from_column_slice(&slope) + &weights * DVector::from_column_slice(&step.away);
     let centre = -(&inverse * &slope);
-    let blocks = normal.blocks.len().max(1) as f64;
+    let left_out: Vec<Together> = normal.blocks.chunks(MOVE_BLOCKS).map(|blocks| Together::of(blocks, count)).collect();
+    let blocks = left_out.len().max(1) as f64;
     let mut variance = vec![0.0; count];
     let mut shares: Vec<(f64, f64)> = vec![(0.0, 0.0); count];
-    for block in &normal.blocks {
-        let own = DMatrix::from_row_slice(count, count, &block.square);
-        let own_slope = DVector::from_column_slice(&block.slope);
-        let Some(without) = scaled_inverse(&(&curve - &own)) else { return untold() };
+    for Together { square: own, slope: own_slope } in &left_out {
+        let Some(without) = scaled_inverse(&(&curve - own)) else { return untold() };
         let moved = -(without * (&slope - own_slope)) - &centre;
         let told = &inverse * own * &inverse;
         for place in 0..count {
