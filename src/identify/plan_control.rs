@@ -1,7 +1,6 @@
 //! The program that tells a control: every kind of block that something in the control may hold back.
 //!
-//! In: the machine. Out: one [`PlannedProgram`]: corners of all angles, tolerances and feeds, with Z too; G64 corners; waves of short blocks, with corners
-//! and rounded; arcs that touch; a straight line
+//! In: the machine. Out: one [`PlannedProgram`]: corners of all angles, tolerances and feeds, with Z too; G64 corners; arcs that touch; a straight line
 //! in blocks so short that the look-ahead ends before the brake does. All of it near the middle of the travel. The trace of its set-points is what
 //! `identify --smoothing` is best given. Does not run anything.
 
@@ -21,11 +20,6 @@ const CORNERS: [(f64, f64); 2] = [(0.08, 0.2), (0.02, 0.06)];
 /// Blocks of the straight line, and their length at scale 1.
 const SHORT: usize = 140;
 const SHORT_MM: f64 = 0.3;
-/// A wave of short blocks: how many, their step, the height of the wave at scale 1, and its angle a block.
-const WAVE: usize = 48;
-const WAVE_MM: f64 = 0.45;
-const WAVE_HEIGHT_MM: f64 = 3.0;
-const WAVE_DEG: f64 = 11.0;
 /// Way lost to ramps, as time for each stretch that begins or ends at rest.
 const RAMP_S: f64 = 0.2;
 
@@ -89,19 +83,6 @@ impl Pen<'_> {
             let radius = if radius_mm > 0.0 { format!("CR={:.4}", radius_mm * self.scale) } else { String::new() };
             self.to(before, point, &radius);
         }
-    }
-
-    /// Blocks that are shorter than a ramp and bend all the time: there nothing but the corners between them holds the feed.
-    fn wave(&mut self, rounding: &str, speed: f64) {
-        let feed = self.feed(speed);
-        self.lines.line(&format!("; short blocks on a wave\n{rounding} {feed}"));
-        for k in 0..=WAVE {
-            let place = k as f64 - WAVE as f64 / 2.0;
-            self.lines.seconds -= (8.0 - WAVE_MM) * self.scale / self.feed * f64::from(u8::from(k > 0));
-            let height_mm = WAVE_HEIGHT_MM * crate::base::units::rad_from_deg(WAVE_DEG * place).sin();
-            self.to("", [WAVE_MM * place, height_mm], "");
-        }
-        self.to("", [0.0, 0.0], "");
     }
 
     /// A straight line in blocks that are shorter than the way to stop.
@@ -168,8 +149,6 @@ pub(super) fn control(machine: &Machine, plane: [&Axis; 2], vertical: Option<&Ax
     let feed = pen.feed(0.12 * velocity);
     pen.lines.line(&format!("; corners without rounding\nG64 {feed}"));
     pen.polyline(0.0, &G64_TURNS_DEG, |_| 5.0);
-    pen.wave("G64", 0.12 * velocity);
-    pen.wave("G642 CTOL=0.02", 0.18 * velocity);
     pen.arcs(0.2 * velocity);
     pen.straight(0.8 * velocity);
     pen.lines.seconds += 10.0 * RAMP_S;
