@@ -203,7 +203,7 @@ fn seven_phase_transformed() {
     prove_transformed(Law::SevenPhase);
 }
 
-/// Every limit holds. Reversed, or with a block in two, about one program in two thousand takes another time by more than it should: none of
+/// Every limit holds. Reversed, or with a block in two, about one program in 500 to 2,000 takes another time by more than it should: none of
 /// the 300, but some of the nightly run.
 #[test]
 fn continuous() {
@@ -212,12 +212,12 @@ fn continuous() {
 
 /// Seeds whose set-points broke a limit once: BRISK with a curve that bends within micrometres, a feed at the start of a plan, a plan that began
 /// in the middle of an interval, a jerk between the places of a spline, DRIVE on a rotary axis, an axis thought to be idle, a start on a cusp, a peak of the jerk that
-/// was looked for no more once planning had left room for it.
-const BROKE_ONCE: [u64; 15] =
-    [3632, 6477, 5355, 6252, 10823, 11939, 12164, 15105, 10576, 12289, 20241, 23951, 27598, 49184, 49190];
+/// was looked for no more once planning had left room for it, a plan begun above the cap of its coarse first interval.
+const BROKE_ONCE: [u64; 16] =
+    [3632, 6477, 5355, 6252, 10823, 11939, 12164, 15105, 10576, 12289, 20241, 23951, 27598, 49184, 49190, 62639];
 
 /// And those that took longer one way than the other, or stopped where no plan was found.
-const SLOW_ONCE: [u64; 8] = [10410, 11197, 11349, 11524, 13347, 23497, 25930, 32940];
+const SLOW_ONCE: [u64; 11] = [10410, 11197, 11349, 11524, 13347, 23497, 25930, 32940, 45215, 102055, 102948];
 
 #[test]
 fn programs_that_were_wrong_once() {
