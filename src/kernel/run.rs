@@ -11,10 +11,11 @@ use super::threads::{PreparationThread, ReadingThread};
 use crate::base::diagnostics::Place;
 use crate::base::{Diagnostic, Tick};
 use crate::feed::OverrideSchedule;
-use crate::interpreter::{Event, Setup};
+use crate::interpreter::Setup;
 use crate::machine::{Loaded, Machine, TimeLawKind, unsupported};
-use crate::program::{BlockRef, OpenedProgram, ProgramId, ProgramSource};
+use crate::program::{BlockRef, ProgramId};
 use crate::recorder::{Recorder, RecordingSetup, RecordingSummary, SignalChoice};
+use crate::smoothing::OpenedPrograms;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -125,17 +126,17 @@ fn drive_loop<S: PieceSource>(
     let machine = kernel.machine().clone();
     let mut recorder = open_recorder(&options, &machine)?;
     let mut pacer = options.pace_ratio.map(|ratio| Pacer::new(ratio, &machine));
-    let (mut drive_alarm, mut opened) = (None, Vec::new());
+    let (mut drive_alarm, mut opened) = (None, OpenedPrograms::default());
     while drive_alarm.is_none() {
         let cycled = kernel.cycle();
-        opened.extend(kernel.output().begun.iter().flat_map(|begun| &begun.events).filter_map(opened_by));
+        kernel.output().begun.iter().for_each(|begun| opened.watch(&begun.events));
         match cycled {
             Ok(Status::Running) => {}
             Ok(Status::Finished) => break,
             // What the cycle gave up to the alarm is recorded all the same.
             Err(alarm) => {
                 let block = kernel.output().setpoint.map(|setpoint| setpoint.path.block);
-                drive_alarm = Some(placed(alarm, &options.setup.program, &opened, block));
+                drive_alarm = Some(placed(alarm, &opened, block));
             }
         }
         if let Some(pacer) = &mut pacer {
@@ -159,28 +160,14 @@ fn drive_loop<S: PieceSource>(
     conclude(kernel, &options, drive_alarm, recorder, pacer.map(|pacer| pacer.deadlines))
 }
 
-/// A program that an event opens.
-fn opened_by(event: &Event) -> Option<OpenedProgram> {
-    match event {
-        Event::ProgramOpened(program) => Some(program.clone()),
-        _ => None,
-    }
-}
-
 /// The alarm of a drive at its line, in the main program or in one that it has opened, whose name the message then tells.
-fn placed(alarm: Diagnostic, main: &ProgramSource, opened: &[OpenedProgram], block: Option<BlockRef>) -> Diagnostic {
-    let Some(block) = block else { return alarm };
-    let sub_program = opened.iter().rev().find(|program| program.id == block.program);
-    let (program, alarm) = match sub_program {
-        Some(program) if program.id != ProgramId(0) => {
-            let message = format!("{}, in the sub-program {}", alarm.message, program.name);
-            (&ProgramSource::from_bytes(&program.name, program.bytes.clone()), Diagnostic { message, ..alarm })
-        }
-        _ => (main, alarm),
+fn placed(alarm: Diagnostic, opened: &OpenedPrograms, block: Option<BlockRef>) -> Diagnostic {
+    let Some((block, place)) = block.and_then(|block| Some((block, opened.place(block)?))) else { return alarm };
+    let message = match block.program {
+        ProgramId(0) => alarm.message.clone(),
+        _ => format!("{}, in the sub-program {}", alarm.message, place.file),
     };
-    let Some(line_text) = program.text_of_line(block.line) else { return alarm };
-    let columns = 0..line_text.trim_end().len();
-    alarm.at(Place { file: program.shared_name(), line: block.line, line_text, columns, label: String::new() })
+    Diagnostic { message, ..alarm }.at(Place { label: String::new(), ..place })
 }
 
 /// The alarm of a drive, and how the axes brake after it.

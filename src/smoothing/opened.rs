@@ -33,7 +33,7 @@ impl OpenedPrograms {
     }
 
     /// The line of a block, marked.
-    pub(super) fn place(&self, block: BlockRef) -> Option<Place> {
+    pub fn place(&self, block: BlockRef) -> Option<Place> {
         let program = self.programs.iter().rev().find(|program| program.id == block.program)?;
         let source = ProgramSource::from_bytes(&program.name, program.bytes.clone());
         let line_text = source.text_of_line(block.line)?.trim_end().to_owned();
