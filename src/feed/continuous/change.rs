@@ -174,7 +174,7 @@ impl Continuous {
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
         let before = std::mem::replace(&mut self.regime.moving_ratio, override_ratio);
         let Expected { way_lu: guess_lu, landing_lu } = self.expect(pieces, start, false);
-        let count = self.reach(pieces, 0, start);
+        let count = self.reach(pieces, 0, start).usual;
         let layout = self.layout(pieces, count, 0, start);
         let pieces = &pieces[..count];
         let rests = pieces.last().is_some_and(|last| last.rests_after);
@@ -220,7 +220,7 @@ impl Continuous {
             pieces[rapids - 1].rests_after = rested;
         }
         let (guess_lu, most_lu) = (self.expect(pieces, start, true).way_lu, self.way_left_lu());
-        let count = self.reach(pieces, 0, start);
+        let count = self.reach(pieces, 0, start).usual;
         let pieces = &mut pieces[..count];
         let found = shortest(guess_lu, most_lu, |way_lu, longer| {
             let (layout, count) = self.layout_to_stop(pieces, start, way_lu);

@@ -45,6 +45,11 @@ const REACH_RATIO: f64 = 8.0;
 /// Intervals of a plan at least, if the window has them.
 const REACH_INTERVALS: f64 = 24.0;
 
+/// A path that rests within so many intervals is planned to its end at once. The problem is not convex: what is the fastest in a blend hangs on what is
+/// planned before and after it, and so a little on where plans end. One plan does not know blocks, and the reversed path has the mirror image of it. It is also
+/// the cheapest: no part of the path is planned twice.
+const WHOLE_INTERVALS_MAX: f64 = 2000.0;
+
 /// A grid for an end about which nothing was known yet serves an end that is slower, down to this share.
 const SLOWER_RATIO: f64 = 0.8;
 
@@ -66,6 +71,14 @@ pub(super) struct Flow {
     /// All of it as one interval, where it is that short and smooth.
     brief: Option<Box<Brief>>,
     grid: Option<Grid>,
+}
+
+/// How many pieces of the window a plan reaches.
+struct Reach {
+    /// As far as the stop at its end does not touch what is handed out next.
+    usual: usize,
+    /// To the rest of the path, where that is near enough; else the usual.
+    whole: usize,
 }
 
 /// A piece of the window.
@@ -102,6 +115,8 @@ pub(super) struct Continuous {
     /// Intervals from here on brake for the end of the window, and from there on they feel it.
     braking: usize,
     disturbed: usize,
+    /// Since the last rest no plan of the whole path was found: it is not looked for again.
+    usual_only: bool,
     /// The law of the front piece where there is no plan for it.
     refuge: Option<TimeLaw>,
     /// The feed override, and where the front piece stands under it.
@@ -175,7 +190,20 @@ impl Continuous {
     fn lay_after(&mut self, pieces: &mut [Piece<'_>], known: usize) -> bool {
         let start = self.start();
         let known = known.min(pieces.len().saturating_sub(1));
-        let count = self.reach(pieces, known, start);
+        let Reach { usual, whole } = self.reach(pieces, known, start);
+        self.usual_only &= start != Start::Rest;
+        if whole > usual && !self.usual_only {
+            if self.lay_so_far(pieces, known, whole) {
+                return true;
+            }
+            self.usual_only = true;
+        }
+        self.lay_so_far(pieces, known, usual)
+    }
+
+    /// A new plan of the first `count` pieces.
+    fn lay_so_far(&mut self, pieces: &mut [Piece<'_>], known: usize, count: usize) -> bool {
+        let start = self.start();
         let mut layout = self.layout(pieces, count, known, start);
         let whole = pieces;
         let pieces = &whole[..count];
@@ -338,9 +366,11 @@ impl Continuous {
         self.kept = self.kept.max(layout::handed_out(&self.places));
     }
 
-    /// How many pieces a plan reaches; those that are no intervals by themselves get their grids. The first `known` ones have places already.
-    fn reach(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> usize {
+    /// How far a plan reaches; pieces that are no intervals by themselves get their grids. The first `known` ones have places already.
+    fn reach(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> Reach {
+        let rests = pieces.last().is_some_and(|last| last.rests_after);
         let (mut beyond_ratio, mut intervals, mut beyond_lu) = (0.0, 0.0, 0.0);
+        let mut usual = None;
         for index in 0..pieces.len() {
             pieces[index..].iter_mut().take(2).for_each(|piece| self.regime.look(piece));
             let length_lu = pieces[index].path.length_lu();
@@ -363,11 +393,17 @@ impl Continuous {
                 beyond_lu += length_lu;
             }
             let enough = beyond_ratio >= REACH_RATIO && intervals >= REACH_INTERVALS;
-            if enough && index >= known && beyond_lu >= self.regime.reach_lu() {
-                return index + 1;
+            if usual.is_none() && enough && index >= known && beyond_lu >= self.regime.reach_lu() {
+                usual = Some(index + 1);
+            }
+            if let Some(usual) = usual
+                && (!rests || intervals > WHOLE_INTERVALS_MAX)
+            {
+                return Reach { usual, whole: usual };
             }
         }
-        pieces.len()
+        let whole = pieces.len();
+        Reach { usual: usual.unwrap_or(whole), whole }
     }
 
     /// Makes the grid of a piece, if it has none, or one for the end of a window that has moved on to a slow place.
