@@ -1,6 +1,7 @@
 //! The kernel as a library and as a loop: snapshot, threads, determinism, figures, alarms.
 
 use sollwert::base::{AxisKind, MachinePoint};
+use sollwert::drive::monitoring;
 use sollwert::feed::{Limit, LimitKind, OverrideSchedule};
 use sollwert::kernel::{Figures, FollowOptions, Kernel, RunOptions, RunOutcome, RunSummary, SetpointTable, Status};
 use sollwert::kernel::{follow, run};
@@ -148,9 +149,14 @@ fn alarm_ns(path: &Path) -> Option<u64> {
 }
 
 fn timed_column(path: &Path, field: &str) -> Vec<(u64, f64)> {
+    timed_column_of(path, "X", field)
+}
+
+fn timed_column_of(path: &Path, axis: &str, field: &str) -> Vec<(u64, f64)> {
+    let topic = format!("/axis/{axis}");
     let recording = Recording::open(path).unwrap();
     let field = axis_field(field).unwrap();
-    let topic = recording.topics().iter().position(|topic| topic.name == "/axis/X").unwrap();
+    let topic = recording.topics().iter().position(|known| known.name == topic).unwrap();
     let of_axis = |message: &sollwert::recorder::Message| message.topic == topic;
     let values = recording.messages().unwrap().map(Result::unwrap).filter(of_axis).map(|message| {
         let Content::Axis(sample) = message.content else { panic!("an axis") };
@@ -216,6 +222,20 @@ fn follow_runs_on_where_a_control_would_stop() {
     assert!(told.len() == 1 && told[0].message.contains("25050") && !told[0].message.contains("line"), "{told:?}");
 }
 
+/// Velocity (100 mm/s are allowed) and travel (-1 to 4 mm) recomputed row by row; acceleration and jerk keep to the limits.
+fn bits_are_those_of_each_row(path: &Path, exceeds: bool) {
+    let (sent, bits) = (column(path, "position_setpoint"), column(path, "monitoring"));
+    let mut count = [0; 2];
+    for k in 1..sent.len() {
+        let fast = (sent[k] - sent[k - 1]).abs() / 1e-3 > 100.1;
+        let outside = !(-1.0..=4.0).contains(&sent[k]);
+        let wanted = [(fast, 64), (outside, 512)].map(|(holds, bit)| if holds { bit } else { 0 });
+        assert_eq!(bits[k] as u32 & 960, wanted[0] | wanted[1], "row {k}: {} mm", sent[k]);
+        count = [count[0] + u32::from(fast), count[1] + u32::from(outside)];
+    }
+    assert_eq!(count.map(|count| count > 0), [exceeds; 2], "{count:?}");
+}
+
 /// A table that asks for more than an axis may: what, how much, in how many rows and from when on, and no word of a table that keeps to the limits.
 #[test]
 fn follow_says_which_limits_its_table_exceeds() {
@@ -238,8 +258,10 @@ fn follow_says_which_limits_its_table_exceeds() {
         let source = sollwert::base::SourceText::new("table.csv", format!("time_s,X_mm\n{rows}"));
         let table = SetpointTable::from_csv(&source, &loaded.machine).unwrap();
         let (start, signals) = (Default::default(), SignalChoice::all());
-        let options = FollowOptions { machine: &loaded, start, recording: None, signals, mantissa_bits: None };
+        let path = scratch("beyond.mcap");
+        let options = FollowOptions { machine: &loaded, start, recording: Some(&path), signals, mantissa_bits: None };
         let warnings = follow(&table, &options).unwrap().warnings;
+        bits_are_those_of_each_row(&path, speed_mm_s > 100.0);
         warnings.iter().filter(|w| w.code == "F0013").map(|w| w.message.clone()).collect::<Vec<String>>()
     };
     assert_eq!(told(4.0, 3.0), Vec::<String>::new());
@@ -273,6 +295,43 @@ fn an_axis_that_never_arrives_is_an_alarm_and_no_hang() {
     // With G603 the block ends with its set-point: the axis sets out again before anybody asks.
     let free = record("G60 G603 G1 X30 F3000\nX0\nM30\n", &loaded, 2, &scratch("free.mcap"));
     assert!(free.alarm.is_none() && !free.summary.limits.contains_key("in_position"));
+}
+
+/// Position loops that are unstable and held by their limits swing for ever, with nothing watched: each axis is in its window again and again, never both
+/// at once. The block end gives up after ten times the positioning time, and names line and axes.
+#[test]
+fn axes_that_are_never_in_position_together_are_an_alarm_and_no_hang() {
+    let mut sets = Vec::new();
+    for (axis, gain) in [("X", "1400"), ("Y", "1530")] {
+        sets.push(format!("axes.{axis}.drive.position_gain_per_s={gain}"));
+        for (key, value) in [("standstill_um", "inf"), ("contour_monitoring_um", "inf"), ("positioning_time_ms", "200")]
+        {
+            sets.push(format!("axes.{axis}.drive.{key}={value}"));
+        }
+    }
+    sets.push("axes.Z.drive.positioning_time_ms=100".to_owned());
+    let loaded = machine("spinner_mvc850", &sets.iter().map(String::as_str).collect::<Vec<&str>>());
+    let path = scratch("apart.mcap");
+    let outcome = record("G64\nG60 G1 X30 Y20 F3000\nX0 Y0\nM30\n", &loaded, 2, &path);
+    let alarm = outcome.alarm.expect("an alarm");
+    assert_eq!((alarm.code, alarm.line()), ("D0009", 2), "{alarm:?}");
+    for words in
+        ["axes X, Y at", "line 2", "X has left its window", "Y has left its window", "never in position (fine)"]
+    {
+        assert!(alarm.message.contains(words), "{words}: {}", alarm.message);
+    }
+    // From the recording: the wait has lasted for 2 s, both were in their windows, never at the same time.
+    let sent = column(&path, "position_setpoint");
+    let rest = sent.iter().position(|x| *x == 30.0).unwrap();
+    let inside = |axis: &str| -> Vec<bool> {
+        let bits = timed_column_of(&path, axis, "monitoring");
+        bits[rest..sent.len()].iter().map(|(_, bits)| *bits as u32 & monitoring::IN_POSITION_FINE != 0).collect()
+    };
+    let (x, y) = (inside("X"), inside("Y"));
+    assert!(x.contains(&true) && y.contains(&true));
+    assert!(!x.iter().zip(&y).any(|(x, y)| *x && *y));
+    let alarm_s = alarm_ns(&path).unwrap() as f64 * 1e-9;
+    assert!((alarm_s - (rest as f64 * 1e-3 + 2.0)).abs() < 2.1e-3, "{alarm_s}");
 }
 
 /// M10 clamps X, M11 releases it: a clamped axis that moves is alarm 26000; one that stands, or was released, is none.
