@@ -126,8 +126,10 @@ pub(super) fn diverged(machine: &Machine, axis: AxisId, tick: Tick) -> Diagnosti
 
 /// A length of an axis for people.
 fn length(kind: AxisKind, value_lu: f64) -> String {
-    match kind {
-        AxisKind::Linear => format!("{value_lu:.4} mm"),
-        AxisKind::Rotary => format!("{:.4} deg", units::deg_from_rad(value_lu)),
-    }
+    let (shown, unit) = match kind {
+        AxisKind::Linear => (value_lu, "mm"),
+        AxisKind::Rotary => (units::deg_from_rad(value_lu), "deg"),
+    };
+    // Longer is no place of a machine: an axis that diverges is told in powers of ten.
+    if shown.abs() < 1e6 { format!("{shown:.4} {unit}") } else { format!("{shown:.1e} {unit}") }
 }
