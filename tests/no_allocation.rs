@@ -19,6 +19,32 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 /// Cycles in which buffers may grow to their size.
 const WARM_UP_CYCLES: u32 = 500;
 
+/// What a drive has besides, on one axis or another: filters, averages, compensations, DSC, a second mass, a screw with errors.
+const OPTIONS: &[&str] = &[
+    r#"axes.X.drive.jerk_filter="fir_low_pass""#,
+    "axes.X.drive.jerk_filter_time_ms=21",
+    "axes.X.drive.jerk_filter_frequency_hz=25",
+    r#"axes.Y.drive.jerk_filter="double_moving_average""#,
+    "axes.Y.drive.jerk_filter_time_ms=12",
+    "axes.Y.drive.jerk_filter_time_add_ms=9",
+    "axes.X.drive.stiffness_control=true",
+    r#"axes.X.drive.speed_filter="pt2""#,
+    "axes.X.drive.speed_filter_frequency_hz=300",
+    r#"axes.Y.drive.current_filter_1="second_order""#,
+    "axes.Y.drive.current_filter_1_frequency_hz=900",
+    "axes.Y.drive.current_filter_1_numerator_frequency_hz=800",
+    "axes.Y.drive.reference_model_frequency_hz=150",
+    "axes.Y.drive.friction_compensation_mm_s=3",
+    "axes.X.mechanics.backlash_um=5",
+    "axes.X.drive.backlash_compensation_um=4",
+    "axes.Z.mechanics.load_inertia_kg_m2=0.004",
+    "axes.Z.mechanics.coupling_stiffness_n_m_per_rad=2500",
+    "axes.Z.mechanics.coupling_damping_n_m_s_per_rad=0.05",
+    r#"axes.Z.drive.feedforward_balancing="pt1""#,
+    "axes.X.mechanics.pitch_error_um=[0.0, 5.0, -2.0]",
+    "axes.X.mechanics.pitch_error_step_mm=50",
+];
+
 /// Pieces that are all there.
 struct Prepared(VecDeque<PlannedPiece>);
 
@@ -34,8 +60,10 @@ impl PieceSource for Prepared {
 
 #[test]
 fn the_cycle_does_not_allocate() {
-    for (name, wanted_cycles) in [("spinner_mvc850", 20_000), ("mikron_ucp710", 10_000)] {
-        let machine = Arc::new(test_machine::shipped(name, &[]));
+    for (name, sets, wanted_cycles) in
+        [("spinner_mvc850", &[][..], 20_000), ("mikron_ucp710", &[], 10_000), ("spinner_mvc850", OPTIONS, 20_000)]
+    {
+        let machine = Arc::new(test_machine::shipped(name, sets));
         let bytes = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/programs/pocket.mpf")).unwrap();
         let mut preparation = Preparation::new(ProgramSource::from_bytes("pocket.mpf", bytes), &machine);
         let pieces = std::iter::from_fn(|| preparation.next_piece()).collect();

@@ -74,6 +74,11 @@ fn the_library_neither_prints_nor_reads_the_environment() {
 }
 
 #[test]
+fn recordings_do_not_depend_on_the_library_of_the_system() {
+    assert_tidy(words::system_functions(&Repository::here()));
+}
+
+#[test]
 fn no_path_of_a_build_machine_is_committed() {
     assert_tidy(words::machine_paths(&Repository::here()));
 }

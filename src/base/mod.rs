@@ -5,10 +5,12 @@
 pub mod axes;
 pub mod clock;
 pub mod diagnostics;
+pub mod portable;
 pub mod space;
 pub mod units;
 
 pub use axes::{AXES_MAX, AxisId, AxisKind, PerAxis};
 pub use clock::{Tick, TimeBase};
 pub use diagnostics::{Diagnostic, Severity, SourceText, Span};
+pub use portable::Portable;
 pub use space::{AxisVector, MachinePoint, PartPoint};

@@ -6,13 +6,15 @@
 //! An axis that is not plain (see `plain`) goes alone. Knows no threads: a caller has several batches.
 
 use super::axis_drive::{AxisDrive, DriveInput};
-use super::block::Block;
+use super::block::{Block, Instructions};
 use super::choice::Drive;
 use super::plain::Cycles;
 use super::wire::AxisSignals;
 
-/// Axes in a block of a study, and in one of a machine with few axes.
-const WIDE: usize = 8;
+/// Axes in a block of a study, and in one of a machine. One step of an axis waits for the one before, so that a processor has time for several registers
+/// full of axes at once: 16 are two of AVX-512, or four of AVX2. Lanes without an axis cost as much as those with one.
+const WIDE: usize = 16;
+const MIDDLE: usize = 8;
 const NARROW: usize = 4;
 
 /// What a batch can hold.
@@ -64,6 +66,7 @@ impl Steps for Drive {
 pub struct DriveBatch<D = AxisDrive> {
     drives: Vec<D>,
     wide: Vec<Together<WIDE>>,
+    middle: Vec<Together<MIDDLE>>,
     narrow: Vec<Together<NARROW>>,
     /// Those that go alone, by place.
     alone: Vec<usize>,
@@ -92,30 +95,33 @@ impl<D: Steps> DriveBatch<D> {
                 None => groups.push((cycles, vec![place])),
             }
         }
-        let (mut wide, mut narrow) = (Vec::new(), Vec::new());
+        let (mut wide, mut middle, mut narrow) = (Vec::new(), Vec::new(), Vec::new());
         for (_, group) in &groups {
             let rest = group.len() % WIDE;
-            let (many, few) = group.split_at(group.len() - if rest <= NARROW { rest } else { 0 });
+            let (many, few) = group.split_at(group.len() - if rest <= MIDDLE { rest } else { 0 });
             wide.extend(many.chunks(WIDE).filter_map(|places| Together::new(&drives, places)));
             match few {
                 [place] => alone.push(*place),
-                few => narrow.extend(Together::new(&drives, few)),
+                few if few.len() <= NARROW => narrow.extend(Together::new(&drives, few)),
+                few => middle.extend(Together::new(&drives, few)),
             }
         }
-        Self { drives, wide, narrow, alone }
+        Self { drives, wide, middle, narrow, alone }
     }
 
-    /// From now on without the instructions that only some processors have (AVX2). Slower; not a bit of a result changes, which a test holds.
-    pub fn on_any_processor(mut self) -> Self {
-        self.wide.iter_mut().for_each(|together| together.block.on_any_processor());
-        self.narrow.iter_mut().for_each(|together| together.block.on_any_processor());
+    /// From now on with these instructions and no others. Slower; not a bit of a result changes, which a test holds.
+    pub fn only_with(mut self, instructions: Instructions) -> Self {
+        self.wide.iter_mut().for_each(|together| together.block.only_with(instructions));
+        self.middle.iter_mut().for_each(|together| together.block.only_with(instructions));
+        self.narrow.iter_mut().for_each(|together| together.block.only_with(instructions));
         self
     }
 
     /// The drives as they stand, for what one of them does by itself.
     pub fn drives_mut(&mut self) -> &mut [D] {
-        let Self { drives, wide, narrow, .. } = self;
+        let Self { drives, wide, middle, narrow, .. } = self;
         wide.iter_mut().for_each(|together| together.part(drives));
+        middle.iter_mut().for_each(|together| together.part(drives));
         narrow.iter_mut().for_each(|together| together.part(drives));
         drives
     }
@@ -138,8 +144,9 @@ impl<D: Steps> DriveBatch<D> {
 
     /// See [`AxisDrive::is_finite`]. A place without a cascade is.
     pub fn is_finite(&self, place: usize) -> bool {
-        let wide = self.wide.iter().find_map(|together| together.is_finite(place));
-        let held = wide.or_else(|| self.narrow.iter().find_map(|together| together.is_finite(place)));
+        let held = self.wide.iter().find_map(|together| together.is_finite(place));
+        let held = held.or_else(|| self.middle.iter().find_map(|together| together.is_finite(place)));
+        let held = held.or_else(|| self.narrow.iter().find_map(|together| together.is_finite(place)));
         let drive = self.drives.get(place).and_then(Steps::cascade);
         held.unwrap_or_else(|| drive.is_none_or(AxisDrive::is_finite))
     }
@@ -156,11 +163,14 @@ impl<D: Steps> DriveBatch<D> {
         input: impl Fn(usize) -> Option<DriveInput>,
         mut show: impl FnMut(usize, &AxisSignals),
     ) {
-        let Self { drives, wide, narrow, alone } = self;
+        let Self { drives, wide, middle, narrow, alone } = self;
         for place in alone {
             step_one(drives, *place, &input, &mut show);
         }
         for together in wide {
+            together.step(drives, &input, &mut show);
+        }
+        for together in middle {
             together.step(drives, &input, &mut show);
         }
         for together in narrow {

@@ -5,7 +5,7 @@
 //! cycle to cycle; [`Block::give_back`] brings it home. `outer_lanes` and `lanes` are the laws, side by side; the boxes between set-point and position
 //! loop, which have memories of many shapes, work axis by axis.
 //!
-//! Compiled twice, for any processor and for AVX2; which one runs is found when the program does, and no bit depends on it.
+//! Compiled for any processor, for AVX2 and for AVX-512 ([`Instructions`]); which one runs is found when the program does, and no bit depends on it.
 
 use super::axis_drive::{AxisDrive, DriveInput};
 use super::encoder::PositionEncoder;
@@ -33,8 +33,18 @@ pub(super) struct Block<const N: usize> {
     columns: Columns<N>,
     /// The columns and boxes hold what the axes remember, and not the drives.
     holds: bool,
-    /// Only what every processor has.
-    any_processor: bool,
+    instructions: Instructions,
+}
+
+/// What a block may use of the processor. A fused multiply-add is in none of them: it rounds once where two instructions round twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instructions {
+    /// All that is compiled for and that there is.
+    Widest,
+    /// AVX2, where there is that.
+    Avx2,
+    /// What every x86-64 has.
+    Any,
 }
 
 /// The boxes in front of the position loop; those of a drive and of a block are swapped.
@@ -85,13 +95,13 @@ impl<const N: usize> Block<N> {
                 happened: [0.0; N],
             },
             holds: false,
-            any_processor: false,
+            instructions: Instructions::Widest,
         })
     }
 
-    /// From now on without the instructions that only some processors have.
-    pub(super) fn on_any_processor(&mut self) {
-        self.any_processor = true;
+    /// From now on with these instructions.
+    pub(super) fn only_with(&mut self, instructions: Instructions) {
+        self.instructions = instructions;
     }
 
     /// Whether the drives are out of date.
@@ -160,10 +170,11 @@ impl<const N: usize> Block<N> {
     pub(super) fn step(&mut self, mut show: impl FnMut(usize, &AxisSignals)) {
         let count = self.setpoint_boxes.len();
         self.columns.given.fill(count);
-        if self.any_processor {
-            cycle_on_any(&mut self.columns, self.cycles);
-        } else {
-            cycle(&mut self.columns, self.cycles);
+        match self.instructions {
+            // One register of AVX-512 full of axes is slower than two of AVX2: while the one is at work nothing else is there to do.
+            Instructions::Widest if N > 8 => cycle(&mut self.columns, self.cycles),
+            Instructions::Widest | Instructions::Avx2 => cycle_up_to_avx2(&mut self.columns, self.cycles),
+            Instructions::Any => cycle_on_any(&mut self.columns, self.cycles),
         }
         let columns = &self.columns;
         for axis in 0..count {
@@ -230,8 +241,14 @@ fn inner_boxes(drive: &AxisDrive) -> InnerBoxes {
 }
 
 /// One position cycle behind the set-point boxes, every axis going on as it is.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw+avx512cd", "x86_64+avx2"))]
 fn cycle<const N: usize>(columns: &mut Columns<N>, cycles: Cycles) {
+    lanes_cycle(columns, cycles);
+}
+
+/// The same without AVX-512.
+#[multiversion(targets("x86_64+avx2"))]
+fn cycle_up_to_avx2<const N: usize>(columns: &mut Columns<N>, cycles: Cycles) {
     lanes_cycle(columns, cycles);
 }
 

@@ -45,6 +45,7 @@ mod wire;
 
 pub use axis_drive::{AxisDrive, DriveInput};
 pub use batch::{DriveBatch, Steps};
+pub use block::Instructions;
 pub use choice::Drive;
 pub use frequency::{FrequencyResponses, GainMargin, LOWEST_HZ, LoopResponse, PhaseMargin, Point, frequency_responses};
 pub use ideal::IdealDrive;

@@ -64,6 +64,14 @@ pub mod monitoring {
     pub const STANDSTILL: u32 = 16;
     /// The speed set-point has been at its limit for longer than MD36220.
     pub const SPEED_LIMIT: u32 = 32;
+    /// `follow`: the set-point is faster than the axis may be. This bit and the next three are not a drive's: who sends the set-points sets them.
+    pub const SETPOINT_VELOCITY: u32 = 64;
+    /// `follow`: its acceleration is beyond that of the axis.
+    pub const SETPOINT_ACCELERATION: u32 = 128;
+    /// `follow`: its jerk is beyond that of the axis.
+    pub const SETPOINT_JERK: u32 = 256;
+    /// `follow`: it is outside the travel.
+    pub const SETPOINT_TRAVEL: u32 = 512;
 }
 
 /// Bits of [`AxisSignals::flags`].

@@ -15,6 +15,7 @@
 use super::LimitKind;
 use super::limits::{AxisRules, Demand, FeedCap, PieceLimits};
 use super::profile::SpeedCap;
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector};
 use crate::geometry::{BlendPoint, HermiteBlend};
 use crate::machine::BlendLaw;
@@ -104,8 +105,8 @@ impl<'a> Scan<'a> {
         let middle = blend.shape(0.5);
         // |S'| has its nearest zeros at w = ± i b with b about 1.4 cos(theta/2): that is how narrow the bend is.
         let half_angle_rad = blend.angle_rad() / 2.0;
-        let width_ratio = 1.4 * half_angle_rad.cos().max(SHARPEST_COSINE);
-        let range_ratio = (1.0 / width_ratio).asinh();
+        let width_ratio = 1.4 * half_angle_rad.portable_cos().max(SHARPEST_COSINE);
+        let range_ratio = (1.0 / width_ratio).portable_asinh();
         Self { rules, blend, along: middle.tangent, inward: middle.normal, half_angle_rad, width_ratio, range_ratio }
     }
 
@@ -117,13 +118,13 @@ impl<'a> Scan<'a> {
     /// Largest |T| of an axis: T turns from half the angle before its middle direction to half the angle after it.
     fn turned(&self, axis: AxisId) -> f64 {
         let (along, inward) = (self.along[axis].abs(), self.inward[axis].abs());
-        let (sin, cos) = self.half_angle_rad.sin_cos();
-        if inward * cos <= along * sin { along.hypot(inward) } else { along * cos + inward * sin }
+        let (sin, cos) = self.half_angle_rad.portable_sin_cos();
+        if inward * cos <= along * sin { along.portable_hypot(inward) } else { along * cos + inward * sin }
     }
 
     /// The blend at a place from -1 to 1.
     fn point(&self, place_ratio: f64) -> BlendPoint {
-        let w = self.width_ratio * (place_ratio * self.range_ratio).sinh();
+        let w = self.width_ratio * (place_ratio * self.range_ratio).portable_sinh();
         self.blend.shape(0.5 * (1.0 + w))
     }
 

@@ -5,6 +5,7 @@
 //! group is nowhere above F (the control follows it along the curve). A rotary axis counts with FGREF times its angle. Where no
 //! axis of the group moves, F holds along s, as without FGROUP.
 
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PerAxis};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU};
 use crate::interpreter::ProgrammedLimits;
@@ -69,6 +70,6 @@ impl FeedGroup {
         // One of the two axes: at worst it alone moves in the plane.
         let mut outside = first;
         (outside[a], outside[b]) = (0.0, 0.0);
-        (arc.radius_mm() * arc.turn_rate_per_mm()).hypot(self.along(&outside))
+        (arc.radius_mm() * arc.turn_rate_per_mm()).portable_hypot(self.along(&outside))
     }
 }

@@ -11,6 +11,7 @@ use super::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use super::ramp::Dynamics;
 use super::worst::Worst;
 use super::{Limit, LimitKind, blend_limits, printed_arc};
+use crate::base::Portable;
 use crate::base::{AxisId, PerAxis};
 use crate::geometry::{Curve, HermiteBlend};
 use crate::interpreter::{Feed, Modes, ProgrammedLimits};
@@ -402,7 +403,7 @@ impl Demand {
         let limit = self.limit(kind);
         let velocity_lu_s = match power {
             2 => 1.0 / self.demand_ratio.sqrt(),
-            3 => 1.0 / self.demand_ratio.cbrt(),
+            3 => 1.0 / self.demand_ratio.portable_cbrt(),
             _ => 1.0 / self.demand_ratio,
         };
         SpeedCap { velocity_lu_s, limit }

@@ -6,6 +6,7 @@
 //! and its length is its mean speed times that (models/arcs.md section 6). Under BRISK there is no J: `d/A`.
 //! Does not know axes, limits' names or curves.
 
+use crate::base::Portable;
 /// Differences of speed below this share of the speed are rounding, not ramps: jerk is no property of the last bits of a number.
 const SAME_SPEED_RATIO: f64 = 1e-12;
 
@@ -73,7 +74,7 @@ impl Dynamics {
     pub fn brakeable(&self, to_lu_s: f64, length_lu: f64) -> f64 {
         let Some(j) = self.jerk_lu_s3 else { return self.reachable(to_lu_s, length_lu) };
         // Where d(reachable)/d(to) = 0: J x² / 2 with 2 J x³ = L, or A²/(2 J) with a phase of constant acceleration.
-        let x = (length_lu / (2.0 * j)).cbrt();
+        let x = (length_lu / (2.0 * j)).portable_cbrt();
         let a = self.acceleration_lu_s2;
         let lowest_lu_s = (j * x * x / 2.0).min(a * a / (2.0 * j));
         self.reachable(to_lu_s.max(lowest_lu_s), length_lu)
@@ -149,7 +150,7 @@ fn rise(p: f64, q: f64) -> f64 {
 /// Positive root of `x³ + p x = q` for `p, q >= 0`: Newton from above, where the cubic is convex and rising.
 fn cubic_root(p: f64, q: f64) -> f64 {
     // Each of the two terms alone gives an upper bound; the smaller bound is at most about 1.5 times the root.
-    let mut x = if p > 0.0 { q.cbrt().min(q / p) } else { q.cbrt() };
+    let mut x = if p > 0.0 { q.portable_cbrt().min(q / p) } else { q.portable_cbrt() };
     for _ in 0..NEWTON_ROUNDS {
         let next = x - (x * x * x + p * x - q) / (3.0 * x * x + p);
         if !(next < x && next >= 0.0) {

@@ -11,6 +11,7 @@
 
 use super::limits::{AxisRules, FeedCap};
 use super::worst::Worst;
+use crate::base::Portable;
 use crate::base::{AXES_MAX, AxisId, AxisVector, PerAxis};
 use crate::kinematics::{JointPath, JointState};
 
@@ -160,7 +161,7 @@ impl Scale<'_> {
         let mut speed_lu_s = self.driven_lu_s(state);
         for axis in AxisId::first(self.rules.axes.len()) {
             let [second, third] = self.demands(state, axis);
-            speed_lu_s = speed_lu_s.min(1.0 / second.abs().sqrt()).min(1.0 / third.abs().cbrt());
+            speed_lu_s = speed_lu_s.min(1.0 / second.abs().sqrt()).min(1.0 / third.abs().portable_cbrt());
         }
         speed_lu_s
     }

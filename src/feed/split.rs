@@ -11,6 +11,7 @@
 use super::limits::{AxisRules, FeedCap, PieceLimits};
 use super::scan::Scan;
 use super::worst::Worst;
+use crate::base::Portable;
 use crate::geometry::Curve;
 use crate::kinematics::JointPath;
 use crate::smoothing::{ContourPiece, PieceKind};
@@ -140,7 +141,7 @@ fn stretches(rules: &AxisRules, path: &JointPath, scan: &Scan) -> Vec<Stretch> {
     if !(highest_lu_s > STEP_RATIO * lowest_lu_s && lowest_lu_s > 0.0) {
         return vec![whole];
     }
-    let level = |speed_lu_s: f64| ((speed_lu_s / lowest_lu_s).ln() / STEP_RATIO.ln()).floor();
+    let level = |speed_lu_s: f64| ((speed_lu_s / lowest_lu_s).portable_ln() / STEP_RATIO.portable_ln()).floor();
     let mut stretches: Vec<Stretch> = Vec::new();
     for i in 0..last {
         let speed_lu_s = speeds[i].min(speeds[i + 1]);

@@ -3,6 +3,7 @@
 //! In: nothing (plain data). Out: [`PlannedPiece`], [`TimeLaw`], [`SpindleMotion`] and [`Limit`]. Does not plan.
 
 use crate::base::AxisId;
+use crate::base::Portable;
 use crate::kinematics::JointPath;
 use std::sync::Arc;
 
@@ -198,9 +199,9 @@ fn sine_ratio(z: f64) -> f64 {
         let tail = 1.0 + z / 110.0 * (1.0 + z / 156.0 * (1.0 + z / 210.0));
         1.0 + z / 6.0 * (1.0 + z / 20.0 * (1.0 + z / 42.0 * (1.0 + z / 72.0 * tail)))
     } else if z > 0.0 {
-        z.sqrt().sinh() / z.sqrt()
+        z.sqrt().portable_sinh() / z.sqrt()
     } else {
-        (-z).sqrt().sin() / (-z).sqrt()
+        (-z).sqrt().portable_sin() / (-z).sqrt()
     }
 }
 
@@ -210,9 +211,9 @@ fn cosine_ratio(z: f64) -> f64 {
         let tail = 1.0 + z / 90.0 * (1.0 + z / 132.0 * (1.0 + z / 182.0));
         0.5 * (1.0 + z / 12.0 * (1.0 + z / 30.0 * (1.0 + z / 56.0 * tail)))
     } else if z > 0.0 {
-        (z.sqrt().cosh() - 1.0) / z
+        (z.sqrt().portable_cosh() - 1.0) / z
     } else {
-        ((-z).sqrt().cos() - 1.0) / z
+        ((-z).sqrt().portable_cos() - 1.0) / z
     }
 }
 

@@ -3,6 +3,7 @@
 //! In: an [`Arc`] or [`SpatialArc`], for which they have closed forms, or samples of any other curve (`scan`). Out: [`Worst`]. Does
 //! not know limits.
 
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PerAxis};
 use crate::geometry::{Arc, SpatialArc};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -33,8 +34,8 @@ impl Worst {
         let (low, high) = (a.min(b), a.max(b));
         // |cos| is 1 at multiples of pi, |sin| a quarter turn further.
         let meets = |offset_rad: f64| ((low - offset_rad) / PI).ceil() * PI + offset_rad <= high;
-        let cos_ratio = if meets(0.0) { 1.0 } else { a.cos().abs().max(b.cos().abs()) };
-        let sin_ratio = if meets(FRAC_PI_2) { 1.0 } else { a.sin().abs().max(b.sin().abs()) };
+        let cos_ratio = if meets(0.0) { 1.0 } else { a.portable_cos().abs().max(b.portable_cos().abs()) };
+        let sin_ratio = if meets(FRAC_PI_2) { 1.0 } else { a.portable_sin().abs().max(b.portable_sin().abs()) };
         let (r, w) = (arc.radius_mm().abs(), arc.turn_rate_per_mm().abs());
         let [x, y] = arc.plane();
         let mut worst = Self::new(arc.at(0.0).first.map(f64::abs), AxisVector::zero(), AxisVector::zero());
@@ -53,8 +54,8 @@ impl Worst {
         let [d1, d2] = arc.directions();
         // Component of the outward direction: size cos(angle - phase); of the direction along the arc a quarter turn further.
         let waves = PerAxis::from_fn(|axis| {
-            let phase_rad = d2[axis].atan2(d1[axis]);
-            let size = d1[axis].hypot(d2[axis]);
+            let phase_rad = d2[axis].portable_atan2(d1[axis]);
+            let size = d1[axis].portable_hypot(d2[axis]);
             let across = cosine_range(from - phase_rad, to - phase_rad);
             let along = cosine_range(from + FRAC_PI_2 - phase_rad, to + FRAC_PI_2 - phase_rad);
             [across, along].map(|range| range.map(|cosine| size * cosine))
@@ -86,6 +87,6 @@ fn cosine_range(from_rad: f64, to_rad: f64) -> [f64; 2] {
     let (low, high) = (from_rad.min(to_rad), from_rad.max(to_rad));
     // cos is 1 at even multiples of pi and -1 at odd ones.
     let meets = |offset_rad: f64| ((low - offset_rad) / (2.0 * PI)).ceil() * 2.0 * PI + offset_rad <= high;
-    let (a, b) = (low.cos(), high.cos());
+    let (a, b) = (low.portable_cos(), high.portable_cos());
     [if meets(PI) { -1.0 } else { a.min(b) }, if meets(0.0) { 1.0 } else { a.max(b) }]
 }

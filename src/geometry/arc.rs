@@ -11,6 +11,7 @@
 
 use super::CurveState;
 use super::curve::{length_over, parameter_length};
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use crate::interpreter::ArcGeometry;
 
@@ -36,16 +37,16 @@ impl Arc {
         let centre =
             |point: &PartPoint| [point.0[first] - geometry.centre_mm[0], point.0[second] - geometry.centre_mm[1]];
         let [x_mm, y_mm] = centre(&start);
-        let angle_start_rad = y_mm.atan2(x_mm);
+        let angle_start_rad = y_mm.portable_atan2(x_mm);
 
         let mut outside = end.0 - start.0;
         outside[first] = 0.0;
         outside[second] = 0.0;
         let pitch_mm = length_over(&outside, linear);
-        let linear_mm = (geometry.radius_mm * geometry.sweep_rad).hypot(pitch_mm);
+        let linear_mm = (geometry.radius_mm * geometry.sweep_rad).portable_hypot(pitch_mm);
         let (length_lu, rotary_only) = parameter_length(linear_mm, &outside, linear);
 
-        let on_circle = |angle_rad: f64| in_plane(geometry, angle_rad.sin_cos(), geometry.radius_mm);
+        let on_circle = |angle_rad: f64| in_plane(geometry, angle_rad.portable_sin_cos(), geometry.radius_mm);
         let origin = start.0 - on_circle(angle_start_rad);
         let slope_times_length = end.0 - on_circle(angle_start_rad + geometry.sweep_rad) - origin;
         let per_length = |value: f64| if length_lu > 0.0 { value / length_lu } else { 0.0 };
@@ -136,7 +137,7 @@ impl Arc {
     pub fn at(&self, s_lu: f64) -> CurveState {
         let s_lu = s_lu.max(0.0).min(self.length_lu);
         let (r, w) = (self.geometry.radius_mm, self.turn_rate_per_mm);
-        let (sin, cos) = (self.angle_start_rad + w * s_lu).sin_cos();
+        let (sin, cos) = (self.angle_start_rad + w * s_lu).portable_sin_cos();
         let position = if s_lu >= self.length_lu {
             self.end
         } else if s_lu > 0.0 {

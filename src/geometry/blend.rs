@@ -21,6 +21,7 @@
 
 use super::CurveState;
 use super::quadrature::integral;
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PartPoint};
 
 /// Panels in half of the parameter range.
@@ -84,7 +85,7 @@ impl HermiteBlend {
             return None;
         }
         // Normalised together, so that cos² + sin² = 1 whatever the rounding of the directions.
-        let scale = twice_cos.hypot(twice_sin);
+        let scale = twice_cos.portable_hypot(twice_sin);
         let shape = Shape::new(twice_cos / scale, twice_sin / scale, alpha_ratio);
         Some(Self {
             corner,
@@ -137,7 +138,7 @@ impl HermiteBlend {
 
     /// theta, the turning angle: 0 = straight.
     pub fn angle_rad(&self) -> f64 {
-        2.0 * self.shape.sin_ratio.atan2(self.shape.cos_ratio)
+        2.0 * self.shape.sin_ratio.portable_atan2(self.shape.cos_ratio)
     }
 
     /// True for the axes that span the plane of the blend.
@@ -254,9 +255,9 @@ impl Shape {
         // table finite for corners that nobody rounds.
         let discriminant = (p1 * p1 - 4.0 * p0 * p2).max(0.0);
         let b = (2.0 * p0 / (p1.abs() + discriminant.sqrt())).sqrt().clamp(1e-6, 1e3);
-        let tau_end = (1.0 / b).asinh();
+        let tau_end = (1.0 / b).portable_asinh();
         for i in 1..=PANELS {
-            let node = if i == PANELS { 1.0 } else { b * (tau_end * i as f64 / PANELS as f64).sinh() };
+            let node = if i == PANELS { 1.0 } else { b * (tau_end * i as f64 / PANELS as f64).portable_sinh() };
             shape.nodes[i] = node;
             shape.lengths[i] = shape.lengths[i - 1] + shape.length_between(shape.nodes[i - 1], node);
         }

@@ -30,6 +30,7 @@
 //!
 //! Does not plan speed and does not change a program: `RND` with the radius found here puts the arc into it.
 
+use crate::base::Portable;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Directions that differ by less are one direction: suits points rounded to 0.01 mm (models/arcs.md section 2).
@@ -185,7 +186,7 @@ impl PlaneArc {
             return Err(NoFillet::ChordTooLong { chord_mm, diameter_mm });
         }
         let half_sine = (chord_mm / diameter_mm).min(1.0);
-        let angle_rad = 2.0 * half_sine.asin();
+        let angle_rad = 2.0 * half_sine.portable_asin();
         let length_mm = if radius_mm.is_finite() { radius_mm * angle_rad } else { chord_mm };
         Ok(Self { start_mm, end_mm, radius_mm, sense, angle_rad, length_mm })
     }
@@ -224,7 +225,7 @@ impl PlaneArc {
 
     fn chord_rad(&self) -> f64 {
         let [x, y] = minus(self.end_mm, self.start_mm);
-        y.atan2(x)
+        y.portable_atan2(x)
     }
 }
 
@@ -336,7 +337,7 @@ impl ArcCorner {
         let centre_mm = plus(corner_mm, p);
         let [first, second] = [self.contact(0, p, r)?, self.contact(1, p, r)?];
         let side = self.fillet_sense.sign();
-        let angle_rad = (side * cross(first.inward, second.inward)).atan2(dot(first.inward, second.inward));
+        let angle_rad = (side * cross(first.inward, second.inward)).portable_atan2(dot(first.inward, second.inward));
         let contacts_mm = [first, second].map(|contact| plus(centre_mm, times(contact.inward, -r)));
         (angle_rad > 0.0).then(|| Fillet {
             centre_mm,
@@ -346,7 +347,7 @@ impl ArcCorner {
             contacts_mm,
             taken_mm: [first.taken_mm, second.taken_mm],
             angle_rad,
-            rounding_distance_mm: r * (angle_rad / 2.0).tan(),
+            rounding_distance_mm: r * (angle_rad / 2.0).portable_tan(),
         })
     }
 
@@ -366,7 +367,7 @@ impl ArcCorner {
         let along_mm = if bend == 0.0 {
             side * cross(p, m)
         } else {
-            cross(m, inward).atan2(dot(m, inward)) / arc.signed_curvature_per_mm()
+            cross(m, inward).portable_atan2(dot(m, inward)) / arc.signed_curvature_per_mm()
         };
         let taken_mm = backward * along_mm;
         (taken_mm >= 0.0 && taken_mm <= arc.length_mm).then_some(Contact { inward, taken_mm })
@@ -431,7 +432,7 @@ fn solved(rows: [Plane; 2], values: [f64; 2]) -> Plane {
 }
 
 fn unit(direction_rad: f64) -> Plane {
-    let (sin, cos) = direction_rad.sin_cos();
+    let (sin, cos) = direction_rad.portable_sin_cos();
     [cos, sin]
 }
 
@@ -456,5 +457,5 @@ fn cross(a: Plane, b: Plane) -> f64 {
 }
 
 fn length(a: Plane) -> f64 {
-    a[0].hypot(a[1])
+    a[0].portable_hypot(a[1])
 }

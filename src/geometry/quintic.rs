@@ -26,6 +26,7 @@
 //! Does not decide T or whether there is a blend: that is the smoothing's.
 
 use super::CurveState;
+use crate::base::Portable;
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::{Arc, LazyLock};
@@ -93,9 +94,9 @@ impl QuinticShape {
         if !(bent && twice_cos.is_finite() && twice_sin.is_finite()) {
             return None;
         }
-        let half_angle_rad = twice_sin.atan2(twice_cos);
+        let half_angle_rad = twice_sin.portable_atan2(twice_cos);
         let series = Series::new(half_angle_rad);
-        let (sin, cos) = half_angle_rad.sin_cos();
+        let (sin, cos) = half_angle_rad.portable_sin_cos();
         Some(Self {
             incoming: *incoming,
             outgoing: *outgoing,
@@ -215,7 +216,7 @@ impl QuinticBlend {
         let w = self.place(s_lu.max(0.0).min(self.length_mm));
         let (h, l) = (self.half_angle_rad, self.half_length_mm);
         let (ww, hollow) = (w * w, 1.0 - w * w);
-        let (sin, cos) = turned_rad(h, w).sin_cos();
+        let (sin, cos) = turned_rad(h, w).portable_sin_cos();
         let k = 1.875 * h * hollow * hollow / l;
         let slope = -7.5 * h * w * (1.0 - ww) / (l * l);
         // Frenet in the plane: r' = t, r'' = k n, r''' = k' n - k² t.
@@ -295,11 +296,11 @@ impl Series {
 /// Of `cos phi = sum (-h²)^k p^2k/(2k)!` and `sin phi = h sum (-h²)^k p^(2k+1)/(2k+1)!`, p = phi/h, the integrals of every k.
 fn table() -> Vec<Series> {
     let nodes: Vec<f64> = (0..NODES).map(|j| (j as f64 + 0.5) * FRAC_PI_2 / NODES as f64).collect();
-    let turned: Vec<f64> = nodes.iter().map(|angle_rad| turned_rad(1.0, angle_rad.cos())).collect();
+    let turned: Vec<f64> = nodes.iter().map(|angle_rad| turned_rad(1.0, angle_rad.portable_cos())).collect();
     // Coefficient of T(degree) of the power of p.
     let coefficient = |power: i32, degree: usize| {
         let weight = if degree == 0 { 1.0 } else { 2.0 } / NODES as f64;
-        let value = |(angle_rad, p): (&f64, &f64)| p.powi(power) * (degree as f64 * angle_rad).cos();
+        let value = |(angle_rad, p): (&f64, &f64)| p.powi(power) * (degree as f64 * angle_rad).portable_cos();
         weight * nodes.iter().zip(&turned).map(value).sum::<f64>()
     };
     let mut factorial = 1.0;

@@ -9,6 +9,7 @@
 
 use super::CurveState;
 use super::curve::{length_over, parameter_length};
+use crate::base::Portable;
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::interpreter::SpatialArcGeometry;
 
@@ -34,13 +35,14 @@ impl SpatialArc {
         let SpatialArcGeometry { directions, centre_mm, radius_mm, sweep_rad } = geometry;
         let [d1, d2] = directions;
         let from_centre = start.0 - *centre_mm;
-        let angle_start_rad = from_centre.dot(d2).atan2(from_centre.dot(d1));
+        let angle_start_rad = from_centre.dot(d2).portable_atan2(from_centre.dot(d1));
         let travel = end.0 - start.0;
         let across = travel - *d1 * travel.dot(d1) - *d2 * travel.dot(d2);
         let pitch_mm = length_over(&across, linear);
-        let (length_lu, rotary_only) = parameter_length((radius_mm * sweep_rad).hypot(pitch_mm), &across, linear);
+        let (length_lu, rotary_only) =
+            parameter_length((radius_mm * sweep_rad).portable_hypot(pitch_mm), &across, linear);
 
-        let on_circle = |angle_rad: f64| (*d1 * angle_rad.cos() + *d2 * angle_rad.sin()) * *radius_mm;
+        let on_circle = |angle_rad: f64| (*d1 * angle_rad.portable_cos() + *d2 * angle_rad.portable_sin()) * *radius_mm;
         let origin = start.0 - on_circle(angle_start_rad);
         let slope_times_length = end.0 - on_circle(angle_start_rad + sweep_rad) - origin;
         let per_length = |value: f64| if length_lu > 0.0 { value / length_lu } else { 0.0 };
@@ -107,7 +109,7 @@ impl SpatialArc {
     pub fn at(&self, s_lu: f64) -> CurveState {
         let s_lu = s_lu.max(0.0).min(self.length_lu);
         let (r, w) = (self.radius_mm, self.turn_rate_per_mm);
-        let (sin, cos) = (self.angle_start_rad + w * s_lu).sin_cos();
+        let (sin, cos) = (self.angle_start_rad + w * s_lu).portable_sin_cos();
         let [d1, d2] = &self.directions;
         let (outward, along) = (*d1 * cos + *d2 * sin, *d2 * cos - *d1 * sin);
         let position = if s_lu >= self.length_lu {

@@ -6,6 +6,7 @@
 
 use super::wire::ArcGeometry;
 use crate::base::AxisId;
+use crate::base::Portable;
 use crate::program::{Columns, Fault, Outcome, codes};
 use std::f64::consts::TAU;
 
@@ -120,7 +121,7 @@ fn bisector(arc: &ProgrammedArc) -> ([f64; 2], [f64; 2]) {
 
 /// The arc from start to end about a centre that is equally far from both.
 fn through(arc: &ProgrammedArc, centre_mm: [f64; 2]) -> ArcGeometry {
-    let angle = |point: [f64; 2]| (point[1] - centre_mm[1]).atan2(point[0] - centre_mm[0]);
+    let angle = |point: [f64; 2]| (point[1] - centre_mm[1]).portable_atan2(point[0] - centre_mm[0]);
     let difference = angle(arc.end_mm) - angle(arc.start_mm);
     let sweep_rad = if arc.counter_clockwise { difference.rem_euclid(TAU) } else { -(-difference).rem_euclid(TAU) };
     ArcGeometry { plane: arc.plane, centre_mm, radius_mm: distance(arc.start_mm, centre_mm), sweep_rad }
@@ -137,8 +138,8 @@ fn check_shape(arc: &ProgrammedArc, adjusted: &ArcGeometry, programmed_mm: [f64;
     }
     let middle = |geometry: &ArcGeometry, radius_mm: f64| {
         let centre = geometry.centre_mm;
-        let start = (arc.start_mm[1] - centre[1]).atan2(arc.start_mm[0] - centre[0]);
-        let (sine, cosine) = (start + geometry.sweep_rad / 2.0).sin_cos();
+        let start = (arc.start_mm[1] - centre[1]).portable_atan2(arc.start_mm[0] - centre[0]);
+        let (sine, cosine) = (start + geometry.sweep_rad / 2.0).portable_sin_cos();
         [centre[0] + radius_mm * cosine, centre[1] + radius_mm * sine]
     };
     let off_mm =
@@ -156,5 +157,5 @@ fn end_off(start_radius_mm: f64, end_radius_mm: f64, columns: &Columns) -> Box<F
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    (a[0] - b[0]).portable_hypot(a[1] - b[1])
 }

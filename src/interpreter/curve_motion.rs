@@ -15,6 +15,7 @@ use super::motion::{AxisWord, MotionWords, bounded};
 use super::run::Interpreter;
 use super::spline::polynomial;
 use super::wire::{ArcGeometry, MoveKind, PolynomialGeometry, PolynomialPiece, SpatialArcGeometry};
+use crate::base::Portable;
 use crate::base::units::rad_from_deg;
 use crate::base::{AxisId, AxisKind, AxisVector, PerAxis};
 use crate::program::syntax::{Form, Typed};
@@ -89,7 +90,7 @@ impl Interpreter {
         let here_lu = self.work_position_lu(resolved.suppression);
         let pole_lu = self.curves.pole_lu;
         let from_pole = plane.map(|axis| here_lu[axis] - pole_lu[axis]);
-        let distance_mm = from_pole[0].hypot(from_pole[1]);
+        let distance_mm = from_pole[0].portable_hypot(from_pole[1]);
         let radius_mm = match &curve.polar_radius {
             Some(word) => {
                 let typed_mm = self.modal.position_lu(AxisKind::Linear, word.typed);
@@ -109,11 +110,11 @@ impl Interpreter {
         let angle_rad = match &curve.polar_angle {
             Some(word) if word.form == Form::Incremental => self.curves.polar_angle_rad + rad_from_deg(word.typed.0),
             Some(word) => rad_from_deg(word.typed.0),
-            None => from_pole[1].atan2(from_pole[0]),
+            None => from_pole[1].portable_atan2(from_pole[0]),
         };
         self.curves.polar_radius_mm = Some(radius_mm);
         self.curves.polar_angle_rad = angle_rad;
-        let (sin, cos) = angle_rad.sin_cos();
+        let (sin, cos) = angle_rad.portable_sin_cos();
         for (axis, ratio) in plane.into_iter().zip([cos, sin]) {
             resolved.axes[axis] = Some(self.at_mm(pole_lu[axis] + radius_mm * ratio, columns));
         }
@@ -140,7 +141,7 @@ impl Interpreter {
                 }
             }
             let [x, y] = [start_mm[0] - centre_mm[0], start_mm[1] - centre_mm[1]];
-            let (sin, cos) = (turn * angle_rad).sin_cos();
+            let (sin, cos) = (turn * angle_rad).portable_sin_cos();
             let end_mm = [centre_mm[0] + x * cos - y * sin, centre_mm[1] + x * sin + y * cos];
             for (axis, end_mm) in plane.into_iter().zip(end_mm) {
                 resolved.axes[axis] = Some(self.at_mm(end_mm, columns));
@@ -153,8 +154,8 @@ impl Interpreter {
                 way_mm[k] = self.axis_target_lu(plane[k], word, resolved.suppression)? - start_mm[k];
             }
         }
-        let half_chord_mm = way_mm[0].hypot(way_mm[1]) / 2.0;
-        let sin = (angle_rad / 2.0).sin();
+        let half_chord_mm = way_mm[0].portable_hypot(way_mm[1]) / 2.0;
+        let sin = (angle_rad / 2.0).portable_sin();
         if !(sin * 1e7 > half_chord_mm && half_chord_mm > SAME_POINT_MM) {
             return Err(Fault::new(codes::BAD_CURVE, columns.clone(), "AR and the end point give no circle")
                 .label("expected an angle between 0 and 360, and an end away from the start"));
@@ -280,7 +281,7 @@ impl Interpreter {
         let frame = &self.frames_of(words.suppression).frame;
         let ahead = frame.inward(&(self.position.0 + direction)) - frame.inward(&self.position.0);
         let tangent = plane.map(|axis| ahead[axis]);
-        let length = tangent[0].hypot(tangent[1]);
+        let length = tangent[0].portable_hypot(tangent[1]);
         if length < SAME_POINT_MM {
             return Err(no_tangent(columns));
         }
@@ -290,7 +291,7 @@ impl Interpreter {
         let way = plane.map(|axis| end_lu[axis] - start_lu[axis]);
         let ahead_mm = way[0] * tangent[0] + way[1] * tangent[1];
         let left_mm = way[1] * tangent[0] - way[0] * tangent[1];
-        let chord_mm = way[0].hypot(way[1]);
+        let chord_mm = way[0].portable_hypot(way[1]);
         let turns = TAU * f64::from(words.turns);
         if chord_mm <= SAME_POINT_MM {
             return Err(Fault::new(codes::BAD_CURVE, columns, "CT needs an end away from the start").label("no circle"));
@@ -305,7 +306,7 @@ impl Interpreter {
         // Signed to the left; the sweep is twice the angle between tangent and chord.
         let radius_mm = chord_mm * chord_mm / (2.0 * left_mm);
         bounded(radius_mm, &columns)?;
-        let sweep_rad = 2.0 * left_mm.atan2(ahead_mm);
+        let sweep_rad = 2.0 * left_mm.portable_atan2(ahead_mm);
         let centre_mm = [start_lu[plane[0]] - radius_mm * tangent[1], start_lu[plane[1]] + radius_mm * tangent[0]];
         let sweep_rad = sweep_rad + sweep_rad.signum() * turns;
         let arc = ArcGeometry { plane, centre_mm, radius_mm: radius_mm.abs(), sweep_rad };
@@ -389,7 +390,7 @@ fn circle_through(start: [f64; 3], middle: [f64; 3], end: [f64; 3]) -> Option<Ci
     let centre = sum(start, to_centre);
     let out = difference(end, centre);
     // The normal is that of the triangle start, middle, end: the sweep is positive and passes the middle.
-    let sweep_rad = dot(out, second).atan2(dot(out, first)).rem_euclid(TAU);
+    let sweep_rad = dot(out, second).portable_atan2(dot(out, first)).rem_euclid(TAU);
     (radius_mm.is_finite() && radius_mm < 1e7 + RADIUS_TOLERANCE_MM).then_some(Circle {
         centre,
         directions: [first, second],

@@ -10,6 +10,7 @@ use super::modal::Motion;
 use super::motion::AxisWord;
 use super::run::Interpreter;
 use super::value::Value;
+use crate::base::Portable;
 use crate::base::{AxisId, AxisKind};
 use crate::program::syntax::{Address, AddressValue, Expr, ExprKind, Form, IndexedValue, Typed};
 use crate::program::words::{CurveWord, PoleOrigin, SplineEnd};
@@ -187,7 +188,7 @@ impl Interpreter {
         let angle = curve.and_then(|curve| curve.polar_angle.as_ref());
         let radius = curve.and_then(|curve| curve.polar_radius.as_ref());
         if let (Some(angle), Some(radius)) = (angle, radius) {
-            let (sin, cos) = crate::base::units::rad_from_deg(angle.typed.0).sin_cos();
+            let (sin, cos) = crate::base::units::rad_from_deg(angle.typed.0).portable_sin_cos();
             let radius_mm = self.modal.position_lu(AxisKind::Linear, radius.typed);
             pole_lu[plane[0]] += radius_mm * cos;
             pole_lu[plane[1]] += radius_mm * sin;

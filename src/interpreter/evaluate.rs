@@ -7,6 +7,7 @@
 use super::run::Interpreter;
 use super::strings::text_function;
 use super::value::Value;
+use crate::base::Portable;
 use crate::base::units::{deg_from_rad, rad_from_deg};
 use crate::program::syntax::{Binary, Expr, ExprKind, Unary};
 use crate::program::words::Function;
@@ -212,9 +213,9 @@ fn call(function: Function, arguments: &[Expr], context: &Interpreter, columns: 
         Function::Tan if sine(a + 90.0) == 0.0 => return outside("an angle whose cosine is not 0"),
         Function::Tan => sine(a) / sine(a + 90.0),
         Function::Asin | Function::Acos if !(-1.0..=1.0).contains(&a) => return outside("a value from -1 to 1"),
-        Function::Asin => deg_from_rad(a.asin()),
-        Function::Acos => deg_from_rad(a.acos()),
-        Function::Atan2 => deg_from_rad(a.atan2(b)),
+        Function::Asin => deg_from_rad(a.portable_asin()),
+        Function::Acos => deg_from_rad(a.portable_acos()),
+        Function::Atan2 => deg_from_rad(a.portable_atan2(b)),
         Function::Sqrt if a < 0.0 => return outside("a value from 0"),
         Function::Sqrt => a.sqrt(),
         Function::Pot => a * a,
@@ -223,8 +224,8 @@ fn call(function: Function, arguments: &[Expr], context: &Interpreter, columns: 
         Function::Round => return Ok(whole_if_it_fits(a.round())),
         Function::RoundUp => return Ok(whole_if_it_fits(a.ceil())),
         Function::Ln if a <= 0.0 => return outside("a value above 0"),
-        Function::Ln => a.ln(),
-        Function::Exp => a.exp(),
+        Function::Ln => a.portable_ln(),
+        Function::Exp => a.portable_exp(),
         Function::MinVal => a.min(b),
         Function::MaxVal => a.max(b),
         Function::Bound if a > b => return outside("the lower bound first, then the upper"),
@@ -248,6 +249,6 @@ fn sine(angle_deg: f64) -> f64 {
     match acute_deg {
         0.0 => 0.0,
         90.0 => sign,
-        _ => sign * rad_from_deg(acute_deg).sin(),
+        _ => sign * rad_from_deg(acute_deg).portable_sin(),
     }
 }

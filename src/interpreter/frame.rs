@@ -18,6 +18,7 @@
 //! shears, which no components express; points are then still exact, and components are those of the nearest frame that keeps the
 //! direction of X.
 
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PerAxis};
 use crate::machine::ZeroOffset;
 use std::f64::consts::FRAC_PI_2;
@@ -358,9 +359,9 @@ fn rotation_matrix([a, b, c]: [f64; 3]) -> Matrix {
 
 /// Angles about X, Y, Z of a rotation, each in its range.
 fn angles_of(r: &Matrix) -> [f64; 3] {
-    let cos_b = r[0][0].hypot(r[1][0]);
+    let cos_b = r[0][0].portable_hypot(r[1][0]);
     // A negative zero would make -180 degrees of 180.
-    let angle_rad = |sine: f64, cosine: f64| (sine + 0.0).atan2(cosine);
+    let angle_rad = |sine: f64, cosine: f64| (sine + 0.0).portable_atan2(cosine);
     let b = angle_rad(-r[2][0], cos_b);
     if cos_b < GIMBAL_RATIO {
         return [0.0, b, angle_rad(-r[0][1], r[1][1])];
@@ -372,7 +373,7 @@ fn angles_of(r: &Matrix) -> [f64; 3] {
 fn sin_cos(angle_rad: f64) -> (f64, f64) {
     let quarters = (angle_rad / FRAC_PI_2).round();
     if (angle_rad - quarters * FRAC_PI_2).abs() > QUARTER_TOLERANCE_RAD {
-        return angle_rad.sin_cos();
+        return angle_rad.portable_sin_cos();
     }
     match quarters.rem_euclid(4.0) as u8 {
         0 => (0.0, 1.0),

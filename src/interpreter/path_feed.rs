@@ -19,6 +19,7 @@ use super::modal::{Motion, ProgrammedFeed};
 use super::motion::{MotionWords, rotary_alone};
 use super::run::Interpreter;
 use super::wire::{CuttingSpeed, Feed, MoveKind, PolynomialGeometry, PolynomialPiece};
+use crate::base::Portable;
 use crate::base::units::{S_PER_MIN, rad_s_from_rpm};
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::program::words::FeedShape;
@@ -163,9 +164,10 @@ impl Interpreter {
             MoveKind::Arc(arc) if arc.plane.contains(&x) => {
                 let [a, b] = arc.plane;
                 let offset = [way.start.0[a] - arc.centre_mm[0], way.start.0[b] - arc.centre_mm[1]];
-                let angle_rad = offset[1].atan2(offset[0]) + share * arc.sweep_rad;
+                let angle_rad = offset[1].portable_atan2(offset[0]) + share * arc.sweep_rad;
                 let place = if x == a { 0 } else { 1 };
-                arc.centre_mm[place] + arc.radius_mm * if place == 0 { angle_rad.cos() } else { angle_rad.sin() }
+                arc.centre_mm[place]
+                    + arc.radius_mm * if place == 0 { angle_rad.portable_cos() } else { angle_rad.portable_sin() }
             }
             _ => from + share * (to - from),
         }
@@ -248,12 +250,12 @@ fn length_of(way: Way<'_>, weights: &AxisVector) -> f64 {
             (across[a], across[b]) = (0.0, 0.0);
             // An axis of the plane alone: as the path of both, which feed does not exceed.
             let turn_mm = arc.radius_mm * arc.sweep_rad * weights[a].max(weights[b]);
-            turn_mm.hypot(weighted(across, weights))
+            turn_mm.portable_hypot(weighted(across, weights))
         }
         MoveKind::SpatialArc(arc) => {
             let [first, second] = arc.directions;
             let across = straight - first * straight.dot(&first) - second * straight.dot(&second);
-            (arc.radius_mm * arc.sweep_rad).hypot(weighted(across, weights))
+            (arc.radius_mm * arc.sweep_rad).portable_hypot(weighted(across, weights))
         }
         MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => polynomial_length(geometry, weights),
         _ => weighted(straight, weights),

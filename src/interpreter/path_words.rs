@@ -15,6 +15,7 @@ use super::evaluate::{evaluate, number};
 use super::feed_state::FeedBase;
 use super::run::Interpreter;
 use super::wire::{Compressor, CornerInsert, CornerShape, MoveKind, ProgrammedLimits};
+use crate::base::Portable;
 use crate::base::units::{S_PER_MIN, rad_from_deg};
 use crate::base::{AxisId, AxisKind, AxisVector, PerAxis};
 use crate::machine::{AccelerationMode, DynamicsMode, PathMode};
@@ -226,7 +227,7 @@ impl Interpreter {
         [[0, 1], [2, 0], [1, 2]].into_iter().find_map(|[a, b]| {
             let [first, second] = [self.geometry[a]?, self.geometry[b]?];
             let inside = |direction: &AxisVector| {
-                let flat = direction[first].hypot(direction[second]);
+                let flat = direction[first].portable_hypot(direction[second]);
                 (direction.norm() - flat).abs() < SAME_SCALE_RATIO * flat
             };
             directions.iter().all(inside).then_some([first, second])

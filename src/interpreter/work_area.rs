@@ -9,6 +9,7 @@ use super::motion::MotionWords;
 use super::run::Interpreter;
 use super::value::trimmed;
 use super::wire::{ArcGeometry, MoveKind};
+use crate::base::Portable;
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, PartPoint, PerAxis};
 use crate::program::{Columns, Fault, Outcome, codes};
@@ -121,7 +122,7 @@ impl Interpreter {
 fn outermost_mm(arc: &ArcGeometry, id: AxisId, start_mm: [f64; 2]) -> [Option<f64>; 2] {
     let Some(index) = arc.plane.iter().position(|axis| *axis == id) else { return [None, None] };
     let [first_mm, second_mm] = [start_mm[0] - arc.centre_mm[0], start_mm[1] - arc.centre_mm[1]];
-    let start_rad = second_mm.atan2(first_mm);
+    let start_rad = second_mm.portable_atan2(first_mm);
     let sides = [(0.0, 1.0), (PI, -1.0)];
     sides.map(|(angle_rad, side_ratio)| {
         let turn_rad = (angle_rad + index as f64 * FRAC_PI_2 - start_rad) * arc.sweep_rad.signum();

@@ -4,8 +4,10 @@
 //! runs on with a warning: what its drives are given may well be what no control would. Does not stop the axes: `braking` does.
 
 use super::cycle::AxisRow;
+use super::in_position::{Apart, WAITS_MAX};
 use crate::base::{AxisId, AxisKind, Diagnostic, Tick, units};
 use crate::drive::monitoring;
+use crate::interpreter::ExactStop;
 use crate::machine::Machine;
 
 /// What the control would stop for, if anything: the first of contour, speed-limit, positioning and standstill monitoring.
@@ -79,6 +81,38 @@ pub(super) fn unclamped(machine: &Machine, line: u32, row: &AxisRow, away_lu: f6
     Diagnostic::error("D0007", message).help(help)
 }
 
+/// The alarm of a block end whose axes have been in position in turn, but never all at once.
+pub(super) fn never_together(machine: &Machine, line: u32, tick: Tick, apart: &Apart) -> Diagnostic {
+    let Apart { waited_s, window, left, outside } = apart;
+    let unsettled: Vec<AxisId> = machine.axis_ids().filter(|axis| left[*axis] > 0 || outside[*axis]).collect();
+    let said = |axis: &AxisId| {
+        let (name, now) = (&machine.axis(*axis).name, if outside[*axis] { ", is outside now" } else { "" });
+        format!("{name} has left its window {} times{now}", left[*axis])
+    };
+    let (word, key) = match window {
+        ExactStop::Coarse => ("coarse", "in_position_coarse"),
+        ExactStop::Fine | ExactStop::Setpoint => ("fine", "in_position_fine"),
+    };
+    let list = unsettled.iter().map(said).collect::<Vec<String>>().join("; ");
+    let names = unsettled.iter().map(|axis| machine.axis(*axis).name.as_str()).collect::<Vec<&str>>().join(", ");
+    let time_s = machine.cycle.time_base.time_s(tick);
+    let message = format!(
+        "axes {names} at {time_s:.4} s, line {line}: the block end has waited for {waited_s:.1} s, and the axes were never in position ({word}) at the same \
+         time: {list}"
+    );
+    let keys = unsettled.iter().map(|axis| {
+        let unit = if machine.axis(*axis).kind == AxisKind::Linear { "um" } else { "deg" };
+        format!("axes.{}.drive.{key}_{unit}", machine.axis(*axis).name)
+    });
+    let keys = keys.collect::<Vec<String>>().join(", ");
+    let help = format!(
+        "a control would wait on; here a block end waits for {WAITS_MAX} times the longest positioning_time_ms (MD36020), at most an hour. Axes hunt where \
+         the breakaway friction is above the Coulomb friction and the integral part strong, and swing where the gains are high: widen {keys}, lower \
+         position_gain_per_s, lengthen speed_reset_time_ms, or let the block end with its set-point (G603, G64)"
+    );
+    Diagnostic::error("D0009", message).help(help)
+}
+
 /// The alarm of a drive whose state is no longer finite.
 pub(super) fn diverged(machine: &Machine, axis: AxisId, tick: Tick) -> Diagnostic {
     let name = &machine.axis(axis).name;
@@ -92,8 +126,10 @@ pub(super) fn diverged(machine: &Machine, axis: AxisId, tick: Tick) -> Diagnosti
 
 /// A length of an axis for people.
 fn length(kind: AxisKind, value_lu: f64) -> String {
-    match kind {
-        AxisKind::Linear => format!("{value_lu:.4} mm"),
-        AxisKind::Rotary => format!("{:.4} deg", units::deg_from_rad(value_lu)),
-    }
+    let (shown, unit) = match kind {
+        AxisKind::Linear => (value_lu, "mm"),
+        AxisKind::Rotary => (units::deg_from_rad(value_lu), "deg"),
+    };
+    // Longer is no place of a machine: an axis that diverges is told in powers of ten.
+    if shown.abs() < 1e6 { format!("{shown:.4} {unit}") } else { format!("{shown:.1e} {unit}") }
 }

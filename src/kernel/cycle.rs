@@ -4,7 +4,7 @@
 //! set-point of the next cycle is sampled one cycle early, because the fine interpolator runs between two known set-points. Does not
 //! record, print or wait: the caller does.
 
-use super::alarms::{diverged, monitored};
+use super::alarms::{diverged, monitored, never_together};
 use super::clamping::Clamping;
 use super::contour_error::ContourErrorMeter;
 use super::figures::Figures;
@@ -168,7 +168,7 @@ impl<S: PieceSource> Kernel<S> {
         let position_cycles: Vec<PositionCycle> =
             machine.axes.iter().map(|axis| PositionCycle::new(&machine, axis, drives)).collect();
         let driven = PerAxis::from_fn(|axis| matches!(stages.get(axis.index()), Some(Drive::Cascade(_))));
-        let in_position = InPositionWire::new(time_base, driven);
+        let in_position = InPositionWire::new(&machine, driven);
         let interpolator = Interpolator::new(&machine);
         let interpolator = if in_position.connected() { interpolator.waiting_in_position() } else { interpolator };
         let row_ticks = position_cycles.iter().map(|cycle| cycle.ticks).fold(time_base.ticks_per_setpoint(), gcd);
@@ -327,6 +327,9 @@ impl<S: PieceSource> Kernel<S> {
                     .or_else(|| monitored(&self.machine, Some(line), &row))
                     .or_else(|| self.clamping.watch(&self.machine, line, &row));
             }
+            let apart = wait.as_ref().and_then(|wait| self.in_position.apart(tick, wait));
+            let line = setpoint.path.block.line;
+            let alarm = alarm.or_else(|| apart.map(|apart| never_together(&self.machine, line, tick, &apart)));
             if let Some(alarm) = alarm {
                 return Err(alarm);
             }

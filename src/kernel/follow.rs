@@ -181,7 +181,7 @@ impl<'a> Follower<'a> {
             let drive = &mut self.drives[axis.index()];
             let input = DriveInput { position_setpoint_lu: setpoint.position_lu, load_n_m, feedforward_active: true };
             let row_at = |tick, signals| AxisRow { tick, axis, setpoint, signals };
-            let signals = if row + 1 == table.rows {
+            let mut signals = if row + 1 == table.rows {
                 drive.step(input)
             } else {
                 let rows = &mut self.rows;
@@ -190,7 +190,7 @@ impl<'a> Follower<'a> {
             if !drive.is_finite() {
                 return Err(diverged(machine, axis, tick));
             }
-            self.limits.see(machine, axis, &setpoint, machine.cycle.time_base.time_s(tick));
+            signals.monitoring |= self.limits.see(machine, axis, &setpoint, machine.cycle.time_base.time_s(tick));
             self.setpoints[axis] = setpoint;
             self.actual[axis] = signals.position_actual_lu;
             self.figures.drive(axis, &signals);

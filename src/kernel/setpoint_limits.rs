@@ -1,10 +1,12 @@
 //! Whether the set-points that `follow` is given keep to the limits of their axes.
 //!
-//! In: every set-point of an axis with its backward differences. Out: one warning an axis: what was exceeded, by how much, how often, from when on. Stops
+//! In: every set-point of an axis with its backward differences. Out: bits of `monitoring` for the row, and one warning an axis: what was exceeded, by how
+//! much, how often, from when on. Stops
 //! nothing: a table may be anything, and the drives show what they make of it. Does not know paths.
 
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, Diagnostic, PerAxis};
+use crate::drive::monitoring;
 use crate::interpolator::AxisSetpoint;
 use crate::machine::{Axis, Machine};
 
@@ -13,6 +15,14 @@ const ROUNDING_SHARE: f64 = 1e-3;
 
 /// Velocity, acceleration, jerk, travel.
 const QUANTITIES: usize = 4;
+
+/// Their bits in `monitoring`.
+const BITS: [u32; QUANTITIES] = [
+    monitoring::SETPOINT_VELOCITY,
+    monitoring::SETPOINT_ACCELERATION,
+    monitoring::SETPOINT_JERK,
+    monitoring::SETPOINT_TRAVEL,
+];
 
 /// What one axis has exceeded.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,18 +44,22 @@ impl SetpointLimits {
         Self { seen: PerAxis::splat([Exceeded::default(); QUANTITIES]) }
     }
 
-    /// A set-point at `time_s`.
-    pub(super) fn see(&mut self, machine: &Machine, axis: AxisId, sent: &AxisSetpoint, time_s: f64) {
+    /// A set-point at `time_s`: the bits of what it exceeds.
+    pub(super) fn see(&mut self, machine: &Machine, axis: AxisId, sent: &AxisSetpoint, time_s: f64) -> u32 {
         let (data, seen) = (machine.axis(axis), &mut self.seen[axis]);
-        for ((value_lu, limit_lu), seen) in values(data, sent).into_iter().zip(limits(data)).zip(seen) {
+        let mut bits = 0;
+        for (((value_lu, limit_lu), seen), bit) in values(data, sent).into_iter().zip(limits(data)).zip(seen).zip(BITS)
+        {
             if value_lu > limit_lu * (1.0 + ROUNDING_SHARE) {
                 if seen.rows == 0 {
                     seen.first_s = time_s;
                 }
                 seen.rows += 1;
                 seen.most_lu = seen.most_lu.max(value_lu);
+                bits |= bit;
             }
         }
+        bits
     }
 
     /// A warning for each axis that has exceeded a limit.

@@ -15,6 +15,7 @@
 //! with the length L of the tool (position of the axes minus position of the tip, head at 0). Does not solve the inverse problem.
 
 use super::JointPath;
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, MachinePoint};
 use crate::machine::{KinematicsSettings, Machine, RotaryJoint};
 use crate::smoothing::ContourPiece;
@@ -107,6 +108,10 @@ impl Joint {
 
     /// Right-handed rotation about the joint's own line.
     fn turned(&self, angle_rad: f64) -> Isometry3<f64> {
-        Isometry3::rotation_wrt_point(UnitQuaternion::from_axis_angle(&self.direction, angle_rad), self.point)
+        // As `UnitQuaternion::from_axis_angle` has it, with the sine of this program.
+        let (sin, cos) = (angle_rad / 2.0).portable_sin_cos();
+        let turn =
+            UnitQuaternion::new_unchecked(nalgebra::Quaternion::from_parts(cos, self.direction.into_inner() * sin));
+        Isometry3::rotation_wrt_point(turn, self.point)
     }
 }

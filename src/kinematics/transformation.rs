@@ -14,6 +14,7 @@
 
 use super::chain::Joint;
 use super::{JointState, Kinematics};
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector};
 use std::f64::consts::FRAC_PI_8;
 
@@ -129,7 +130,7 @@ fn product(a: &Jet, b: &Jet) -> Jet {
 /// Sine and cosine of an angle, by the chain rule.
 fn sine_cosine(angle: &Jet) -> [Jet; 2] {
     let [_, w, dw, ddw] = *angle;
-    let (sin, cos) = angle[0].sin_cos();
+    let (sin, cos) = angle[0].portable_sin_cos();
     let (even, odd) = (w * w, ddw - w * w * w);
     [
         [sin, cos * w, cos * dw - sin * even, cos * odd - 3.0 * sin * w * dw],

@@ -22,7 +22,7 @@ const TABLES: [&str; 3] = ["drive", "motor", "mechanics"];
 const RESONANCE_SHARE_MAX: f64 = 4.0;
 
 /// A block that ends in position waits no longer, so that every run ends.
-const POSITIONING_TIME_MAX_S: f64 = 3600.0;
+pub const POSITIONING_TIME_MAX_S: f64 = 3600.0;
 
 /// The drive of an axis; `None` for an ideal axis, and after a report of half a drive.
 pub(super) fn drive<'f>(axis: &Section<'f>, limits: &AxisLimits) -> Option<(DriveData, LoopCycles<'f>)> {

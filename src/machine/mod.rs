@@ -33,6 +33,7 @@ mod workshop;
 pub use catalogue::tables;
 pub use checked::*;
 pub use choices::Choice;
+pub use drive::POSITIONING_TIME_MAX_S;
 pub use drive_options::{
     Balancing, CURRENT_FILTERS, DriveOptions, Filter, FilterShape, FrictionAdaptation, JerkFilter, JerkFilterKind,
     PositionSource,

@@ -25,6 +25,7 @@
 use super::Corner;
 use super::dynamics::Dynamics;
 use super::transition::{Pair, Tolerances, common, enough, per_axis};
+use crate::base::Portable;
 use crate::base::{AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Curve, CurveState, DISPLACEMENT_MIN_LU, HermiteBlend, Line, QuinticShape};
 use crate::interpreter::{Feed, Modes, ThreadCoupling};
@@ -202,7 +203,7 @@ impl Rules {
         let t = joint.room.clamped(self.wanted_lu(joint, &u, &v));
         let Some(blend) = HermiteBlend::new(lines[0].end(), &u, &v, t, alpha) else { return Junction::Pass };
         // Of the clamped T, so that the tolerance only gets smaller.
-        let tolerance_mm = 0.25 * t * (4.0 - alpha) * (joint.angle_rad / 2.0).sin();
+        let tolerance_mm = 0.25 * t * (4.0 - alpha) * (joint.angle_rad / 2.0).portable_sin();
         joint.blended(Curve::Blend(blend), tolerance_mm, t)
     }
 
@@ -271,7 +272,7 @@ impl Rules {
         let [along, onward] = [u.first, v.first].map(|direction| direction.masked(&self.linear));
         // The tip almost turns back: what rotary axes have to do on the way is pressed into almost no length.
         let carries = u.first != along || v.first != onward;
-        let sharp = carries && (turning_angle(&along, &onward) / 2.0).cos() < SHARP_COS_MAX;
+        let sharp = carries && (turning_angle(&along, &onward) / 2.0).portable_cos() < SHARP_COS_MAX;
         if sharp && Dynamics::new(&self.machine, joint.before, joint.after, joint.ends).stop_is_quicker(&blend.curve) {
             return Some(Junction::Stop);
         }
@@ -389,7 +390,7 @@ impl Rules {
     fn turns_back(&self, curve: &Curve, u: &AxisVector, v: &AxisVector) -> bool {
         let counted = if curve.rotary_only() { self.linear.map(|is| !is) } else { self.linear };
         let angle_rad = turning_angle(&u.masked(&counted), &v.masked(&counted));
-        (angle_rad / 2.0).cos() < REVERSAL_COS_MIN
+        (angle_rad / 2.0).portable_cos() < REVERSAL_COS_MIN
     }
 
     /// The linear axes have a corner.
@@ -469,7 +470,7 @@ impl Joint<'_> {
 fn turning_angle(incoming: &AxisVector, outgoing: &AxisVector) -> f64 {
     let u = *incoming * (1.0 / incoming.norm());
     let v = *outgoing * (1.0 / outgoing.norm());
-    2.0 * (v - u).norm().atan2((v + u).norm())
+    2.0 * (v - u).norm().portable_atan2((v + u).norm())
 }
 
 /// The curvature, or the second derivative of a rotary axis, is another one.

@@ -9,6 +9,7 @@
 
 use super::corner::Side;
 use super::smoother::lower;
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PerAxis};
 use crate::geometry::{Curve, CurveState};
 use crate::interpreter::{Feed, Modes};
@@ -89,7 +90,7 @@ impl Dynamics {
             let state = curve.at(length_lu * i as f64 / CROSSING_SAMPLES as f64);
             let slowness = |axis: AxisId| {
                 let bend = (state.second[axis].abs() / self.acceleration_lu_s2[axis]).sqrt();
-                bend.max((state.third[axis].abs() / self.jerk_lu_s3[axis]).cbrt())
+                bend.max((state.third[axis].abs() / self.jerk_lu_s3[axis]).portable_cbrt())
             };
             AxisId::first(crate::base::AXES_MAX).map(slowness).fold(0.0, f64::max)
         };

@@ -15,6 +15,7 @@
 //! Does not choose the feed, and does not round the corners of a chamfer: those are corners like any other.
 
 use super::smoother::Held;
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
 use crate::geometry::{Arc, Curve, DISPLACEMENT_MIN_LU, Line, SpatialArc};
 use crate::interpreter::{ArcGeometry, CornerInsert, CornerShape, SpatialArcGeometry};
@@ -104,7 +105,7 @@ pub(super) fn inserted(
     let first = Side::new(&before.curve, &plane, before.curve.length_lu() - before.head_lu, true)?;
     let second = Side::new(&after.curve, &plane, share * after.curve.length_lu(), false)?;
     let (u, v) = (first.tangent, second.tangent);
-    let turn_rad = cross(u, v).atan2(dot(u, v));
+    let turn_rad = cross(u, v).portable_atan2(dot(u, v));
     if turn_rad.abs() < ANGLE_MIN_RAD {
         return Err(Omitted::NoCorner);
     }
@@ -153,7 +154,7 @@ impl Basis {
                 if outside(first) || outside(second) {
                     return None;
                 }
-                let (sin, cos) = arc.angles_rad()[0].sin_cos();
+                let (sin, cos) = arc.angles_rad()[0].portable_sin_cos();
                 let radius_mm = arc.radius_mm();
                 let centre = arc.start().0 - (own[0] * cos + own[1] * sin) * radius_mm;
                 Some(Kind::Circle {
@@ -190,7 +191,7 @@ impl<'a> Side<'a> {
     fn new(curve: &'a Curve, plane: &Basis, free_lu: f64, leads_to: bool) -> Result<Self, Omitted> {
         let state = curve.at(if leads_to { f64::INFINITY } else { 0.0 });
         let projected = plane.projected(&state.first);
-        let plane_ratio = projected[0].hypot(projected[1]);
+        let plane_ratio = projected[0].portable_hypot(projected[1]);
         let moves = plane_ratio > PLANE_MIN_RATIO;
         if curve.rotary_only() || !moves {
             return Err(Omitted::Shape);
@@ -208,7 +209,7 @@ impl<'a> Side<'a> {
         match &self.kind {
             Kind::Straight { plane_ratio } => away * dot(minus(centre_mm, corner), self.tangent) / plane_ratio,
             Kind::Circle { centre_mm: own, sense, turn_rate_per_mm, .. } => {
-                let angle = |point: Point| (point[1] - own[1]).atan2(point[0] - own[0]);
+                let angle = |point: Point| (point[1] - own[1]).portable_atan2(point[0] - own[0]);
                 let turned_rad = away * sense * (angle(centre_mm) - angle(corner));
                 turned_rad.rem_euclid(TAU) / turn_rate_per_mm
             }
@@ -266,7 +267,7 @@ impl Sides<'_> {
         let end = self.second.curve.trimmed(self.second.place_lu(head_lu), f64::INFINITY).start();
         let angle = |point: &PartPoint| {
             let [x, y] = minus(self.plane.projected(&point.0), centre_mm);
-            y.atan2(x)
+            y.portable_atan2(x)
         };
         let sweep_rad = self.sense * (self.sense * (angle(&end) - angle(&start))).rem_euclid(TAU);
         let curve = self.plane.arc([start, end], centre_mm, radius_mm, sweep_rad, linear);
@@ -310,7 +311,7 @@ impl Sides<'_> {
         let straight = matches!((&self.first.kind, &self.second.kind), (Kind::Straight { .. }, Kind::Straight { .. }));
         let wanted_lu = match (base, straight) {
             (false, _) => length_mm,
-            (true, true) => 0.5 * length_mm / (0.5 * self.turn_rad).cos(),
+            (true, true) => 0.5 * length_mm / (0.5 * self.turn_rad).portable_cos(),
             (true, false) => {
                 let (mut low, mut high) = (0.0, free_lu);
                 for _ in 0..BISECTIONS {

@@ -1,7 +1,7 @@
 //! Many drives in step are the same drives alone, to the last bit.
 
 use crate::rig::{Random, Rig, input, mvc_x, mvc_y, ucp_a};
-use sollwert::drive::{AxisDrive, AxisSignals, DriveBatch, DriveInput};
+use sollwert::drive::{AxisDrive, AxisSignals, DriveBatch, DriveInput, Instructions};
 use sollwert::machine::JerkFilterKind;
 
 /// Sixty-four parameter sets around the two Spinner axes, friction and limits included, and others that go alone.
@@ -91,25 +91,40 @@ fn inputs(rigs: &[Rig], k: u32) -> Vec<DriveInput> {
         .collect()
 }
 
-/// What the processor can do must not be seen in a result: the instructions that every processor has give the same bits as the widest ones of
-/// the one that the test runs on (a processor without AVX2 compares the former with itself; the single drive is compiled for every processor, too).
+/// What the processor can do must not be seen in a result: the instructions that every processor has give the same bits as AVX2 and as the widest ones of
+/// the one that the test runs on, AVX-512 where there is that (a processor without them compares the former with itself; the single drive is compiled for
+/// every processor, too). Blocks of every size take part: 16, 8 and 4 lanes, full and with lanes to spare.
 #[test]
 fn every_processor_gives_the_same_bits() {
     let mut random = Random(2);
     let rigs = rigs(&mut random);
-    let mut single: Vec<AxisDrive> = rigs.iter().map(|rig| rig.drive(0.2)).collect();
-    let mut fast = DriveBatch::new(single.clone());
-    let mut plain = DriveBatch::new(single.clone()).on_any_processor();
-    for k in 0..400 {
-        let inputs = inputs(&rigs, k);
-        let mut signals = [(); 2].map(|()| vec![AxisSignals::default(); rigs.len()]);
-        fast.step(&inputs, |place, now| signals[0][place] = *now);
-        plain.step(&inputs, |place, now| signals[1][place] = *now);
-        let bits = |signals: &AxisSignals| format!("{signals:?}");
-        for (n, drive) in single.iter_mut().enumerate() {
-            let alone = bits(&drive.step(inputs[n]));
-            assert_eq!(alone, bits(&signals[0][n]), "drive {n}, cycle {k}");
-            assert_eq!(alone, bits(&signals[1][n]), "drive {n}, cycle {k}, any processor");
+    let single: Vec<AxisDrive> = rigs.iter().map(|rig| rig.drive(0.2)).collect();
+    // How many of the 64 that go together are in each group of batches: 4 x 16; 16 + 16 + 16 and 13 with lanes to spare, 3; 8; 5; 4; 2.
+    for sizes in [&[70][..], &[64, 6], &[16, 8, 20, 11, 5, 6, 4]] {
+        let mut groups = Vec::new();
+        let mut first = 0;
+        for size in sizes {
+            let drives = &single[first..first + size];
+            let batches = [Instructions::Widest, Instructions::Avx2, Instructions::Any]
+                .map(|only| DriveBatch::new(drives.to_vec()).only_with(only));
+            groups.push((first, batches));
+            first += size;
+        }
+        assert_eq!(first, rigs.len());
+        let mut single = single.clone();
+        for k in 0..110 {
+            // Three times as fast, so that rest, reversals, jump and load are all in it.
+            let inputs = inputs(&rigs, 3 * k);
+            let bits = |signals: &AxisSignals| format!("{signals:?}");
+            let alone: Vec<String> =
+                single.iter_mut().zip(&inputs).map(|(drive, input)| bits(&drive.step(*input))).collect();
+            for (first, batches) in &mut groups {
+                for (which, batch) in batches.iter_mut().enumerate() {
+                    batch.step(&inputs[*first..], |place, now| {
+                        assert_eq!(bits(now), alone[*first + place], "drive {}, cycle {k}, {which}", *first + place);
+                    });
+                }
+            }
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::rig::{Random, Rig, input, mvc_x, mvc_y};
 use sollwert::base::TimeBase;
-use sollwert::drive::{AxisSignals, DriveBatch, DriveInput, flags};
+use sollwert::drive::{AxisSignals, DriveBatch, DriveInput, Instructions, flags};
 use sollwert::machine::{
     Balancing, DriveOptions, ErrorTable, Filter, FilterShape, FrictionAdaptation, JerkFilter, JerkFilterKind,
     PositionSource,
@@ -181,7 +181,7 @@ fn any_options_neither_panic_nor_break_a_limit() {
         let start_lu = [0.0, 12.3, -3.0][seed as usize % 3];
         let mut alone = rig.drive(start_lu);
         let mut batch = DriveBatch::new(vec![alone.clone(), alone.clone()]);
-        let mut any = batch.clone().on_any_processor();
+        let mut others = [Instructions::Avx2, Instructions::Any].map(|only| batch.clone().only_with(only));
         let step_lu = wild(&mut random, 1e-3);
         let mut setpoint_lu = start_lu;
         for k in 0..200 {
@@ -193,7 +193,7 @@ fn any_options_neither_panic_nor_break_a_limit() {
             assert_sane(&what, &rig, &signals, alone.is_finite());
             // NaN is not equal to itself, but it is written alike.
             let written = format!("{signals:?}");
-            for batch in [&mut batch, &mut any] {
+            for batch in [&mut batch].into_iter().chain(&mut others) {
                 batch.step(&[input; 2], |_, signals| assert_eq!(format!("{signals:?}"), written, "{what}"));
                 assert_eq!(batch.is_finite(1), alone.is_finite(), "{what}");
             }

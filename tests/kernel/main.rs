@@ -2,4 +2,5 @@
 
 mod drives;
 mod runs;
+mod waits;
 mod what_if;

@@ -65,6 +65,19 @@ fn section_8_rejections_name_their_key() {
             }
         }
     }
+    let (_, mikron) = machine::shipped()[2];
+    for (key, values) in [
+        ("mechanics.gravity_sin_n_m", &["nan", "inf", "-inf"][..]),
+        ("mechanics.gravity_cos_n_m", &["nan", "inf", "-inf"]),
+        ("mechanics.gear_ratio", &["nan", "inf", "0"]),
+        ("drive.speed_setpoint_max_deg_s", &["nan", "0", "-1"]),
+        ("encoder.position_resolution_deg", &["nan", "inf", "-1"]),
+    ] {
+        for value in values {
+            let message = loaded(mikron, &[format!("axes.A.{key}={value}")]).expect_err(key);
+            assert!(message.contains(&format!("axes.A.{key}")), "{key} = {value}:\n{message}");
+        }
+    }
     for key in POSITIVE_OR_INFINITE {
         assert!(loaded(EXAMPLE, &[format!("axes.X.{key}=inf")]).is_ok(), "{key} = inf is refused");
     }

@@ -128,6 +128,15 @@ fn what_the_library_must_not_call_is_found() {
 }
 
 #[test]
+fn functions_of_the_system_are_found() {
+    let code = "let (s, c) = a.sin_cos();\n// a.sin()\nlet b = libm::sin(a) + a.portable_cos().sqrt();\nf(f64::hypot, \"x.ln()\", a.powi(2));\n";
+    assert_eq!(lines(words::system_functions, "src/feed/a.rs", code), [1, 4]);
+    for path in ["src/report/page.rs", "src/drive/frequency.rs", "tests/feed/a.rs"] {
+        assert!(lines(words::system_functions, path, code).is_empty(), "{path}");
+    }
+}
+
+#[test]
 fn paths_of_a_build_machine_are_found() {
     let text = format!(
         "see {slash}home{slash}anna{slash}x\nsee docs{slash}home{slash}x\n\"{slash}work{slash}a\"\n",

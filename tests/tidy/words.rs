@@ -361,6 +361,36 @@ pub fn forbidden(repository: &Repository) -> Vec<Fault> {
     faults
 }
 
+/// Rooms between a program and its recording.
+const PORTABLE_ROOMS: [&str; 8] =
+    ["interpreter", "geometry", "smoothing", "kinematics", "feed", "interpolator", "drive", "kernel"];
+/// Frequency responses are shown, and stand in no recording.
+const SHOWN_ONLY: &str = "src/drive/frequency.rs";
+/// Methods of `f64` that the C library of the system computes, and what calls one of them.
+const OF_THE_SYSTEM: &str = "sin cos tan asin acos atan atan2 sin_cos sinh cosh tanh asinh acosh atanh exp exp2 exp_m1 ln ln_1p log log2 log10 \
+                             powf hypot cbrt from_axis_angle";
+
+/// What the C library computes has other last bits on another processor: the way from a program to its recording takes `base::Portable`.
+pub fn system_functions(repository: &Repository) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for file in repository.sources() {
+        if !file.room().is_some_and(|room| PORTABLE_ROOMS.contains(&room)) || file.path == SHOWN_ONLY {
+            continue;
+        }
+        let code = code_only(&file.text);
+        for three in tokens(&code).windows(3) {
+            let called = three[0].text == "." && three[2].text == "(";
+            let named = ["f64", "UnitQuaternion"].contains(&three[0].text) && three[1].text == "::";
+            let name = if called { three[1] } else { three[2] };
+            if (called || named) && OF_THE_SYSTEM.split_whitespace().any(|word| word == name.text) {
+                let reason = format!("`{}` has other last bits on another processor: take base::Portable", name.text);
+                faults.push(file.fault(name.offset, "portable", reason));
+            }
+        }
+    }
+    faults
+}
+
 /// No path of the machine on which something was built or recorded: it means nothing to a reader, and tells what it should not.
 pub fn machine_paths(repository: &Repository) -> Vec<Fault> {
     // Joined here, so that this file does not break its own rule.

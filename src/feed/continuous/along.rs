@@ -4,6 +4,7 @@
 
 use super::chain::{Chain, Profile};
 use super::estimate::ray_exponent;
+use crate::base::Portable;
 
 /// A walk along a plan.
 pub(super) struct Along<'a> {
@@ -34,9 +35,9 @@ impl<'a> Along<'a> {
         let points = self.profile.points.get(self.index..self.index + 2)?;
         let [from, to] = [points[0].speed_squared_lu2_s2, points[1].speed_squared_lu2_s2];
         let b = if from <= 0.0 {
-            to * share.powf(ray_exponent(interval))
+            to * share.portable_powf(ray_exponent(interval))
         } else if to <= 0.0 {
-            from * (1.0 - share).powf(ray_exponent(interval))
+            from * (1.0 - share).portable_powf(ray_exponent(interval))
         } else {
             self.profile.inside(self.chain, self.index, share).0.speed_squared_lu2_s2
         };

@@ -5,6 +5,7 @@
 //! Does not keep limits: the problem does.
 
 use super::interval::{Derivatives, Interval};
+use crate::base::Portable;
 
 /// Rounds for the time of an interval.
 const PACE_ROUNDS: usize = 3;
@@ -50,7 +51,7 @@ pub(super) fn bend_cap(interval: &Interval, state: &Derivatives) -> f64 {
         let axis = bound.axis;
         b = b.min(interval.reserve_ratio * bound.acceleration_lu_s2 / state.second[axis].abs());
         if let Some(jerk) = bound.jerk_lu_s3 {
-            b = b.min((interval.reserve_ratio * jerk / state.third[axis].abs()).powf(2.0 / 3.0));
+            b = b.min((interval.reserve_ratio * jerk / state.third[axis].abs()).portable_powf(2.0 / 3.0));
         }
     }
     b
@@ -72,7 +73,7 @@ pub(super) fn ray_cap(interval: &Interval) -> f64 {
         if let Some(jerk) = bound.jerk_lu_s3 {
             // √b (q''' b + 3/2 q'' 4/3 b/h + 1/2 q' 4/9 b/h²)
             let demand = third + 2.0 * second / h + 2.0 / 9.0 * first / (h * h);
-            b = b.min((interval.reserve_ratio * jerk / demand).powf(2.0 / 3.0));
+            b = b.min((interval.reserve_ratio * jerk / demand).portable_powf(2.0 / 3.0));
         }
     }
     b

@@ -9,6 +9,7 @@
 
 use super::interval::{Bounds, Derivatives, FASTER_MAX_RATIO, Interval, STEP_MAX_S, STEP_SHARE, Tangent, cap};
 use crate::base::AxisId;
+use crate::base::Portable;
 use crate::feed::limits::AxisRules;
 use crate::geometry::Curve;
 use crate::kinematics::JointPath;
@@ -147,7 +148,7 @@ pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &D
     for (axis, limits) in AxisId::first(rules.axes.len()).zip(&rules.axes) {
         speed_lu_s = speed_lu_s.min((limits.acceleration_max_lu_s2 / state.second[axis].abs()).sqrt());
         if rules.jerk_limited {
-            speed_lu_s = speed_lu_s.min((limits.jerk_max_lu_s3 / state.third[axis].abs()).cbrt());
+            speed_lu_s = speed_lu_s.min((limits.jerk_max_lu_s3 / state.third[axis].abs()).portable_cbrt());
         }
     }
     speed_lu_s
@@ -170,7 +171,8 @@ pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
         let s_lu = share * length_lu;
         let speed_lu_s = speed_at(s_lu);
         for (end_lu_s, distance_lu) in ends_lu_s.iter_mut().zip([s_lu, length_lu - s_lu]) {
-            *end_lu_s = end_lu_s.min(speed_lu_s + 0.5 * jerk_lu_s3 * (6.0 * distance_lu / jerk_lu_s3).cbrt().powi(2));
+            *end_lu_s =
+                end_lu_s.min(speed_lu_s + 0.5 * jerk_lu_s3 * (6.0 * distance_lu / jerk_lu_s3).portable_cbrt().powi(2));
         }
     }
     ends_lu_s
@@ -185,7 +187,7 @@ impl<'a> Cutter<'a> {
         let tangent = Tangent::between(rules, blend, [&start.first, &end.first]);
         // From rest to rest in four phases of constant jerk, or in two of constant acceleration: the least that the piece can take.
         let alone_s = if tangent.jerk_limited {
-            (32.0 * length_lu / tangent.jerk_lu_s3).cbrt()
+            (32.0 * length_lu / tangent.jerk_lu_s3).portable_cbrt()
         } else {
             2.0 * (length_lu / tangent.acceleration_lu_s2).sqrt()
         };

@@ -7,6 +7,7 @@
 use super::chain::{Chain, Look, PathPoint, Profile};
 use super::estimate::ray_exponent;
 use super::interval::{AxisBound, Derivatives, Interval};
+use crate::base::Portable;
 use crate::feed::{Limit, LimitKind};
 
 /// How far below the share that would just do.
@@ -292,7 +293,7 @@ fn most_used_at_rest(chain: &Chain, profile: &Profile, index: usize, states: &[D
     for eighth in 1..=8 {
         let share = 0.125 * eighth as f64;
         let state = &states[if sign > 0.0 { eighth } else { 8 - eighth }];
-        let b = b_end * share.powf(power);
+        let b = b_end * share.portable_powf(power);
         let slope_lu_s2 = sign * power * b / (share * h);
         let bend = power * (power - 1.0) * b / (share * h).powi(2);
         let point = PathPoint { speed_squared_lu2_s2: b, slope_lu_s2 };

@@ -3,6 +3,7 @@
 //! In: q', q'', q''' at its start, middle and end ([`Derivatives`]), the limits of its axes ([`Bounds`]). Out: what lies between, by interpolation.
 //! Does not know how long a stretch should be: `grid` and `group` do.
 
+use crate::base::Portable;
 use crate::base::{AxisId, AxisVector};
 use crate::feed::LimitKind;
 use crate::feed::junction::STOP;
@@ -237,7 +238,7 @@ impl Tangent {
             return by_acceleration;
         }
         // s = j t³/6, v = j t²/2
-        let by_jerk = from_lu_s + 0.5 * self.jerk_lu_s3 * (6.0 * way_lu / self.jerk_lu_s3).cbrt().powi(2);
+        let by_jerk = from_lu_s + 0.5 * self.jerk_lu_s3 * (6.0 * way_lu / self.jerk_lu_s3).portable_cbrt().powi(2);
         by_acceleration.min(by_jerk)
     }
 

@@ -6,6 +6,7 @@
 
 use super::chain::{Chain, PathPoint, Profile};
 use super::layout::Place;
+use crate::base::Portable;
 use crate::feed::{Limit, Phase, TimeLaw};
 
 /// Below this |z| the series of the duration is exact.
@@ -55,7 +56,7 @@ fn duration_s(length_lu: f64, speeds_lu_s: f64, rate_per_s2: f64) -> f64 {
         return 2.0 * x * (1.0 + z * (1.0 / 3.0 + z * (0.2 + z * (1.0 / 7.0 + z * (1.0 / 9.0 + z * tail)))));
     }
     let root = z.abs().sqrt();
-    let angle = if z > 0.0 { root.min(1.0 - f64::EPSILON).atanh() } else { root.atan() };
+    let angle = if z > 0.0 { root.min(1.0 - f64::EPSILON).portable_atanh() } else { root.portable_atan() };
     2.0 * x * angle / root
 }
 

@@ -5,6 +5,7 @@
 
 use super::grid::Grid;
 use super::interval::Interval;
+use crate::base::Portable;
 use crate::feed::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use crate::feed::ramp::Dynamics;
 use crate::feed::{Limit, LimitKind, Phase, TimeLaw};
@@ -44,7 +45,7 @@ fn slow(interval: &Interval) -> f64 {
         let [_, second, third] = most(interval, bound.axis);
         v = v.min((0.5 * bound.acceleration_lu_s2 / second).sqrt());
         if let Some(jerk) = bound.jerk_lu_s3 {
-            v = v.min((0.5 * jerk / third).cbrt());
+            v = v.min((0.5 * jerk / third).portable_cbrt());
         }
     }
     v

@@ -31,6 +31,7 @@ mod window;
 
 use super::corner::Rules;
 use super::smoother::Held;
+use crate::base::Portable;
 use crate::geometry::Curve;
 use crate::interpreter::{Compressor, Event, Feed};
 use crate::machine::PathMode;
@@ -153,7 +154,7 @@ impl Run {
         }
         let ends = [before.at(f64::INFINITY), block.curve.at(0.0)];
         let [u, v] = ends.map(|state| state.first.masked(rules.linear()));
-        let turn_rad = 2.0 * (v - u).norm().atan2((v + u).norm());
+        let turn_rad = 2.0 * (v - u).norm().portable_atan2((v + u).norm());
         let (h, k) = (before.length_lu(), block.curve.length_lu());
         let tolerance_mm = self.track.tolerances.contour_mm;
         let corner = turn_rad >= rules.settings().compressor_corner_rad

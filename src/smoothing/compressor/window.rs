@@ -6,6 +6,7 @@
 use super::basis::{Banded, Basis, KNOTS, basis, bending, values};
 use super::track::{Span, Track};
 use crate::base::AxisVector;
+use crate::base::Portable;
 
 /// Share of the tolerance above which a span is made softer in the last rounds, and the share that a span counts with whose bound
 /// does not hold.
@@ -201,7 +202,7 @@ impl Window {
         for index in 0..count {
             let around = &self.shares[index.saturating_sub(1)..(index + 2).min(count)];
             let share = around.iter().fold(0.0_f64, |most, share| most.max(*share));
-            let factor = (target_share / share).powf(1.0 / 6.0).clamp(SOFTER_MAX_RATIO, STIFFER_MAX_RATIO);
+            let factor = (target_share / share).portable_powf(1.0 / 6.0).clamp(SOFTER_MAX_RATIO, STIFFER_MAX_RATIO);
             let factor = if both {
                 factor
             } else if share > SOFTER_SHARE {
