@@ -196,6 +196,7 @@ fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
         traces.iter().zip(&texts).map(|(trace, text)| TracedProgram { trace, setup: setup(text) }).collect();
     let result =
         calibrate(&pairs[..1], &pairs[1..], &start, &mut progress()).unwrap_or_else(|d| panic!("{}", d.render(false)));
+    let mut missed = Vec::new();
     for ((before, after), text) in result.agreements.iter().zip(&texts) {
         let percent = |a: &Agreement| 100.0 * (a.planned_s / a.traced_s - 1.0);
         println!(
@@ -209,9 +210,11 @@ fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
             after.path_rms_mm
         );
         // What users need: cycle time within 1 %, feed profile within 3 % of F RMS.
-        assert!(percent(after).abs() < 1.0, "{after:?}\n{text}\n{result:?}");
-        assert!(after.feed_rms_share < 0.03, "{after:?}\n{text}\n{result:?}");
+        if percent(after).abs() > 1.0 || after.feed_rms_share > 0.03 {
+            missed.push(format!("{after:?}\n{text}"));
+        }
     }
+    assert!(missed.is_empty(), "{missed:?}\n{result:?}");
     result
 }
 
