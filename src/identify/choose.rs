@@ -30,6 +30,8 @@ const BETTER_SHARE: f64 = 0.8;
 const DIFFERS: f64 = 1e-3;
 /// Windows that are tried first.
 const WINDOWS: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 1000];
+/// A window that leaves less than this share of the cost over explains more of the motion than numbers do.
+const FAR_BETTER_SHARE: f64 = 0.5;
 /// Windows between two of those that are tried at once.
 const BETWEEN: usize = 4;
 /// Other numbers to begin from: radial shares of acceleration and jerk, factors on transition jerk and jerk.
@@ -125,6 +127,14 @@ impl<'a, 'b> Search<'a, 'b> {
             self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&machine)));
             let knobs = self.knobs_of(&machine, false);
             let mut trial = Fit { machine, plans: self.fit.plans, ..start.clone() };
+            // Numbers fitted under a window that is far off make up for it, and no window fits them any more: a far better one comes first.
+            let costs = window_costs(&mut trial);
+            let now = costs.iter().find(|(blocks, _)| *blocks == trial.machine.look_ahead_blocks).map(|now| now.1);
+            if let Some((blocks, cost)) = least(&costs).map(|best| costs[best])
+                && now.is_none_or(|now| cost < FAR_BETTER_SHARE * now)
+            {
+                trial.machine.look_ahead_blocks = blocks;
+            }
             let enough = NONE_LEFT * NONE_LEFT;
             let mut cost = trial.run(&knobs, Aim::Both, FIRST_STEPS, enough);
             // One that does not come near in a few steps is the wrong one.
@@ -269,46 +279,13 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
-    /// Costs of some windows at the present numbers.
-    fn costs(&mut self, windows: &[usize]) -> Vec<(usize, f64)> {
-        let with = |blocks: &usize| Machine { look_ahead_blocks: *blocks, ..self.fit.machine.clone() };
-        let machines: Vec<Machine> = windows.iter().map(with).collect();
-        let costs = self.fit.costs(&machines, Aim::Both);
-        windows.iter().copied().zip(costs).filter_map(|(blocks, cost)| Some((blocks, cost?))).collect()
-    }
-
-    /// Costs of the usual windows and of all of those around the best one, in order.
-    fn window_costs(&mut self) -> Vec<(usize, f64)> {
-        let mut windows = WINDOWS.to_vec();
-        windows.push(self.fit.machine.look_ahead_blocks);
-        windows.sort_unstable();
-        windows.dedup();
-        let mut costs = self.costs(&windows);
-        // A window that ends in an alarm has no cost.
-        let mut tried = windows;
-        loop {
-            let Some(best) = least(&costs) else { return costs };
-            let below = best.checked_sub(1).map_or(costs[best].0, |k| costs[k].0);
-            let above = costs.get(best + 1).map_or(costs[best].0, |next| next.0);
-            let inside: Vec<usize> = (below + 1..above).filter(|blocks| !tried.contains(blocks)).collect();
-            if inside.is_empty() {
-                return costs;
-            }
-            let stride = inside.len().div_ceil(BETWEEN);
-            let more: Vec<usize> = inside.into_iter().step_by(stride).collect();
-            costs.extend(self.costs(&more));
-            tried.extend(more);
-            costs.sort_by_key(|(blocks, _)| *blocks);
-        }
-    }
-
     /// Takes the window that leaves the least over, and fits again; that of the file stays where it is as good.
     fn window(&mut self) -> bool {
         if self.left() <= NONE_LEFT {
             return false;
         }
         self.say("look-ahead window");
-        let costs = self.window_costs();
+        let costs = window_costs(&mut self.fit);
         let Some((blocks, cost)) = least(&costs).map(|best| costs[best]) else { return false };
         let now = costs.iter().find(|(blocks, _)| *blocks == self.fit.machine.look_ahead_blocks);
         let takes = now.is_none_or(|(_, now)| cost < 0.999 * now);
@@ -327,7 +304,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let limit = 1.05 * self.cost + DIFFERS * DIFFERS;
         let mut tried = vec![most, now + 1];
         tried.extend((1..now).rev().take(1).chain(WINDOWS.into_iter().rev().filter(|blocks| blocks + 1 < now)));
-        let costs = self.costs(&tried);
+        let costs = costs_of(&mut self.fit, &tried);
         let of =
             |blocks: usize| costs.iter().find(|(tried, _)| *tried == blocks).is_some_and(|(_, cost)| *cost < limit);
         let below = tried[2..].iter().take_while(|blocks| of(**blocks)).last();
@@ -360,6 +337,39 @@ impl<'a, 'b> Search<'a, 'b> {
             told.push((switch, differences.iter().all(|square| square.is_none_or(|square| square > limit))));
         }
         told
+    }
+}
+
+/// Costs of some windows at the present numbers.
+fn costs_of(fit: &mut Fit<'_>, windows: &[usize]) -> Vec<(usize, f64)> {
+    let with = |blocks: &usize| Machine { look_ahead_blocks: *blocks, ..fit.machine.clone() };
+    let machines: Vec<Machine> = windows.iter().map(with).collect();
+    let costs = fit.costs(&machines, Aim::Both);
+    windows.iter().copied().zip(costs).filter_map(|(blocks, cost)| Some((blocks, cost?))).collect()
+}
+
+/// Costs of the usual windows and of all of those around the best one, in order.
+fn window_costs(fit: &mut Fit<'_>) -> Vec<(usize, f64)> {
+    let mut windows = WINDOWS.to_vec();
+    windows.push(fit.machine.look_ahead_blocks);
+    windows.sort_unstable();
+    windows.dedup();
+    let mut costs = costs_of(fit, &windows);
+    // A window that ends in an alarm has no cost.
+    let mut tried = windows;
+    loop {
+        let Some(best) = least(&costs) else { return costs };
+        let below = best.checked_sub(1).map_or(costs[best].0, |k| costs[k].0);
+        let above = costs.get(best + 1).map_or(costs[best].0, |next| next.0);
+        let inside: Vec<usize> = (below + 1..above).filter(|blocks| !tried.contains(blocks)).collect();
+        if inside.is_empty() {
+            return costs;
+        }
+        let stride = inside.len().div_ceil(BETWEEN);
+        let more: Vec<usize> = inside.into_iter().step_by(stride).collect();
+        costs.extend(costs_of(fit, &more));
+        tried.extend(more);
+        costs.sort_by_key(|(blocks, _)| *blocks);
     }
 }
 

@@ -143,8 +143,8 @@ impl Fit<'_> {
     fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim) -> Vec<Option<Vec<f64>>> {
         let step = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
-            // Towards the middle of the range where there is an end of it.
-            if knob.value(now + STEP) > knob.value(now) * (1.0 + STEP / 1e3) { STEP } else { -STEP }
+            // Towards the middle of the range where there is an end of it within the step.
+            if knob.free(knob.value(now + STEP)) > now + STEP / 2.0 { STEP } else { -STEP }
         };
         let steps: Vec<f64> = knobs.iter().map(step).collect();
         let of = |knob: &Knob| knobs.iter().position(|known| known == knob).map_or(STEP, |place| steps[place]);
@@ -220,7 +220,8 @@ impl Fit<'_> {
             damping = eased;
             let gained = before - square(&residuals) - pull(&trial);
             let moved: Vec<f64> = trial.iter().zip(&free).map(|(new, old)| new - old).collect();
-            columns = Some(carried(slopes, &base, &residuals, &moved));
+            // The path is quick to plan again, and too bent in its three numbers for columns that are carried on.
+            columns = (aim != Aim::Shape).then(|| carried(slopes, &base, &residuals, &moved));
             (self.values, base, free) = (values, residuals, trial);
             if gained < if fresh { GAIN_SHARE } else { SLOW_SHARE } * before {
                 if fresh {
@@ -247,7 +248,7 @@ impl Fit<'_> {
         let (gram, gradient) = normal(columns, at.base, at.free, at.origin);
         let trial = |damping: f64| {
             let damped = &gram + DMatrix::from_diagonal(&gram.diagonal().map(|d| damping * (d + PULL * PULL)));
-            let step = damped.cholesky()?.solve(&gradient);
+            let step = inside(&damped, &gradient, at.free, knobs)?;
             let free = (at.free.iter().zip(&step).zip(knobs))
                 .map(|((f, s), knob)| knob.free(knob.value(f - s.clamp(-STEP_MAX, STEP_MAX))))
                 .collect::<Vec<f64>>();
@@ -318,6 +319,37 @@ impl Told {
         let others = self.places.iter().enumerate().filter_map(|(k, place)| Some((k, (*place)?)));
         let best = others.filter(|(k, _)| *k != knob).max_by(|a, b| alike(a.1).total_cmp(&alike(b.1)))?;
         (alike(best.1) > ALIKE).then_some(best.0)
+    }
+}
+
+/// The step of the normal equations that stays inside the ranges: what would leave its range goes to the end of it, and the others are solved again with that. Cut
+/// off alone, it would leave the others where they belong only together with it.
+fn inside(damped: &DMatrix<f64>, gradient: &DVector<f64>, free: &[f64], knobs: &[Knob]) -> Option<Vec<f64>> {
+    let p = knobs.len();
+    let mut held: Vec<Option<f64>> = vec![None; p];
+    loop {
+        let open: Vec<usize> = (0..p).filter(|k| held[*k].is_none()).collect();
+        let moved = |k: usize| held[k].unwrap_or(0.0);
+        if open.is_empty() {
+            return Some((0..p).map(moved).collect());
+        }
+        let right = DVector::from_fn(open.len(), |i, _| {
+            gradient[open[i]] - (0..p).map(|k| damped[(open[i], k)] * moved(k)).sum::<f64>()
+        });
+        let left = DMatrix::from_fn(open.len(), open.len(), |i, j| damped[(open[i], open[j])]);
+        let solved = left.cholesky()?.solve(&right);
+        let mut step: Vec<f64> = (0..p).map(moved).collect();
+        let mut leaves = false;
+        for (k, by) in open.iter().zip(&solved) {
+            let end = knobs[*k].free(knobs[*k].value(free[*k] - by));
+            step[*k] = *by;
+            if (free[*k] - by - end).abs() > 1e-9 {
+                (held[*k], leaves) = (Some(free[*k] - end), true);
+            }
+        }
+        if !leaves {
+            return Some(step);
+        }
     }
 }
 

@@ -306,6 +306,18 @@ fn another_blend_law_is_found() {
     assert!(result.choices.contains(&("smoothing.blend_law", "entry".to_owned())), "{:?}", result.choices);
 }
 
+/// Both ratios stand at the end of what they may be: there the fit must not stop beside them.
+#[test]
+fn a_control_that_uses_the_whole_tolerance_is_found() {
+    let result = quickly(CASES[5].sets, FITTED);
+    for key in ["smoothing.tolerance_ratio", "smoothing.tolerance_ratio_reversal"] {
+        let estimate = result.estimates.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{key}: {result:?}"));
+        assert!((estimate.value - 1.0).abs() < 0.01, "{estimate:?}");
+    }
+    let alpha = result.estimates.iter().find(|e| e.key == "smoothing.alpha").unwrap_or_else(|| panic!("{result:?}"));
+    assert!((alpha.value / 2.5 - 1.0).abs() < 0.02, "{alpha:?}");
+}
+
 /// The trace of set-points as that of a control that records the feed along the path alone.
 fn feed_alone(trace: &Trace) -> Trace {
     let columns: Vec<&Vec<f64>> = trace.signals.iter().map(|signal| &signal.values).collect();
