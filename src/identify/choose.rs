@@ -74,11 +74,16 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Knobs under the words of `machine`: of time with one jerk for all axes, or those of the shape too and a jerk for each axis. The path of
     /// set-points a cycle apart is a polyline that depends on the feed: what the shape is worth is known when the feed is.
     fn knobs_of(&self, machine: &Machine, per_axis: bool) -> Vec<Knob> {
+        let shape = if per_axis { &Knob::SHAPE[..] } else { &[] };
+        shape.iter().copied().chain(self.knobs_of_time(machine, per_axis)).collect()
+    }
+
+    fn knobs_of_time(&self, machine: &Machine, per_axis: bool) -> Vec<Knob> {
         let step = match machine.feed.corner_rule {
             CornerRule::FollowUp => Knob::FollowUp,
             CornerRule::Overload => Knob::Overload,
         };
-        let mut knobs = if per_axis { Knob::SHAPE.to_vec() } else { Vec::new() };
+        let mut knobs = Vec::new();
         // The law of the least time knows the true sums of the axes, no shares.
         if machine.feed.time_law != TimeLawKind::Continuous {
             knobs.extend([Knob::RadialAcceleration, Knob::RadialJerk]);
@@ -174,6 +179,15 @@ impl<'a, 'b> Search<'a, 'b> {
         self.say("time along the path");
         self.refine(false);
         self.window();
+        if self.left() > NONE_LEFT {
+            // Twelve numbers at once find their way from near the end of it only.
+            self.say("time along the path, with the shape");
+            let knobs: Vec<Knob> =
+                Knob::SHAPE.into_iter().chain(self.knobs_of_time(&self.fit.machine, false)).collect();
+            if let Some(cost) = self.fit.run(&knobs, Aim::Both, PASSES.1, NONE_LEFT * NONE_LEFT) {
+                self.cost = cost;
+            }
+        }
         if self.left() > NONE_LEFT {
             self.say("time along the path, axis by axis");
             self.per_axis = true;

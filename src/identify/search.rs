@@ -30,8 +30,9 @@ pub(super) enum Aim {
     Both,
 }
 
-/// Step of a free number for the differences: wide enough to see through the grain of the set-point cycle.
-const STEP: f64 = 0.02;
+/// Steps of a free number for the differences: wide enough to see through the grain of the set-point cycle; where that leads no further, wider ones see past the
+/// bends of limits that take turns, and narrower ones along them.
+const STEPS: [f64; 3] = [0.02, 0.06, 0.007];
 /// The same for what is told: wide enough to see where a limit ceases to hold.
 const SIDE_STEP: f64 = 0.1;
 /// Longest step of a free number in one pass: the law is bent.
@@ -46,7 +47,7 @@ const FLOOR_SHARE: f64 = 0.2;
 const DAMPING: (f64, f64, f64) = (1e-3, 1e-7, 1e3);
 const WORSE: f64 = 10.0;
 const BETTER: f64 = 0.1;
-/// A pass that gains less than this share of the cost was the last; one with carried columns asks for new ones below the other share.
+/// A pass that gains less than this share of the cost was the last with its differences; one with carried columns asks for new ones below the other share.
 const GAIN_SHARE: f64 = 1e-2;
 const SLOW_SHARE: f64 = 0.1;
 /// Pairs of dampings that are tried at most.
@@ -140,14 +141,14 @@ impl Fit<'_> {
     }
 
     /// Columns d residuals / d free number.
-    fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim) -> Vec<Option<Vec<f64>>> {
+    fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim, wide: f64) -> Vec<Option<Vec<f64>>> {
         let step = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
             // Towards the middle of the range where there is an end of it within the step.
-            if knob.free(knob.value(now + STEP)) > now + STEP / 2.0 { STEP } else { -STEP }
+            if knob.free(knob.value(now + wide)) > now + wide / 2.0 { wide } else { -wide }
         };
         let steps: Vec<f64> = knobs.iter().map(step).collect();
-        let of = |knob: &Knob| knobs.iter().position(|known| known == knob).map_or(STEP, |place| steps[place]);
+        let of = |knob: &Knob| knobs.iter().position(|known| known == knob).map_or(wide, |place| steps[place]);
         self.slopes(base, knobs, aim, of)
     }
 
@@ -164,7 +165,7 @@ impl Fit<'_> {
             let now = knob.free(self.value(*knob));
             let moved = knob.value(now + step(knob));
             let by = knob.free(moved) - now;
-            if by.abs() < 0.5 * STEP {
+            if by.abs() < 0.5 * step(knob).abs() {
                 return None;
             }
             let residuals = self.residuals(&self.with(&[(*knob, moved)]), aim)?;
@@ -189,8 +190,9 @@ impl Fit<'_> {
         let mut base = self.residuals(&self.values, aim)?;
         let mut damping = DAMPING.0;
         let mut columns: Option<Vec<Option<Vec<f64>>>> = None;
-        let mut fresh = false;
+        let (mut fresh, mut wide) = (false, 0);
         for _ in 0..passes {
+            let Some(step) = STEPS.get(wide) else { break };
             let before = square(&base) + pull(&free);
             if square(&base) < enough {
                 break;
@@ -199,7 +201,7 @@ impl Fit<'_> {
                 Some(carried) => carried,
                 None => {
                     fresh = true;
-                    self.columns(&base, knobs, aim)
+                    self.columns(&base, knobs, aim, *step)
                 }
             };
             let step = self.step(
@@ -211,9 +213,7 @@ impl Fit<'_> {
                 fresh,
             );
             let Some((values, residuals, trial, eased)) = step else {
-                if fresh {
-                    break;
-                }
+                wide += usize::from(fresh);
                 damping = DAMPING.0;
                 continue;
             };
@@ -224,10 +224,10 @@ impl Fit<'_> {
             columns = (aim != Aim::Shape).then(|| carried(slopes, &base, &residuals, &moved));
             (self.values, base, free) = (values, residuals, trial);
             if gained < if fresh { GAIN_SHARE } else { SLOW_SHARE } * before {
-                if fresh {
-                    break;
-                }
+                wide += usize::from(fresh);
                 columns = None;
+            } else if gained > SLOW_SHARE * before {
+                wide = 0;
             }
             fresh = false;
         }
