@@ -171,7 +171,7 @@ fn counted(plants: usize, (over_share, stribeck_share): (f64, f64)) -> [(usize, 
 }
 
 /// Plants that always run of each kind; `IDENTIFY_REPETITIONS=200` is the nightly run.
-const PLANTS: usize = 22;
+const PLANTS: usize = 26;
 
 fn asked() -> usize {
     std::env::var("IDENTIFY_REPETITIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(PLANTS)
