@@ -26,6 +26,8 @@ const NONE_LEFT: f64 = 1e-3;
 const MUCH_LEFT: f64 = 0.01;
 /// Another word must leave less than this share of the cost over.
 const BETTER_SHARE: f64 = 0.8;
+/// Share of the cost by which two windows differ that are one.
+const SAME_SHARE: f64 = 1e-3;
 /// RMS of ln(feed) from which two words drive differently.
 const DIFFERS: f64 = 1e-3;
 /// Windows that are tried first.
@@ -60,13 +62,16 @@ pub(super) struct Search<'a, 'b> {
     axes: Vec<AxisId>,
     /// The numbers of the present words are those of each axis.
     per_axis: bool,
+    /// Window of the file.
+    file_blocks: usize,
     progress: &'b mut dyn FnMut(&str),
 }
 
 impl<'a, 'b> Search<'a, 'b> {
     /// `None` where the machine as it is ends in an alarm.
     pub(super) fn new(fit: Fit<'a>, axes: Vec<AxisId>, progress: &'b mut dyn FnMut(&str)) -> Option<Self> {
-        let mut search = Self { fit, cost: f64::INFINITY, axes, per_axis: false, progress };
+        let file_blocks = fit.machine.look_ahead_blocks;
+        let mut search = Self { fit, cost: f64::INFINITY, axes, per_axis: false, file_blocks, progress };
         search.cost = search.fit.cost(Aim::Both)?;
         Some(search)
     }
@@ -195,6 +200,46 @@ impl<'a, 'b> Search<'a, 'b> {
             if self.window() {
                 self.refine(true);
             }
+            self.windows_beside();
+        }
+    }
+
+    /// Windows beside the present one and that of the file, each with numbers fitted to it: numbers that were fitted under a wrong one make up for a part of it, so that
+    /// with them no other looks better.
+    fn windows_beside(&mut self) {
+        for _ in 0..ROUNDS {
+            if self.done() {
+                return;
+            }
+            self.say("windows beside");
+            let now = self.fit.machine.look_ahead_blocks;
+            let mut beside = vec![self.file_blocks, now.saturating_sub(1).max(1), now + 1];
+            beside.sort_unstable();
+            beside.dedup();
+            beside.retain(|blocks| *blocks != now);
+            let (knobs, limit) = (self.knobs_of(&self.fit.machine, true), self.cost);
+            // One that moves the program in the same way needs no fit.
+            let differs = |cost: f64| (cost / limit - 1.0).abs() > SAME_SHARE;
+            let mut best: Option<(f64, Fit<'a>)> = None;
+            for (blocks, cost) in costs_of(&mut self.fit, &beside) {
+                if !differs(cost) {
+                    continue;
+                }
+                let machine = Machine { look_ahead_blocks: blocks, ..self.fit.machine.clone() };
+                let mut trial = Fit { machine, ..self.fit.clone() };
+                let cost = trial.run(&knobs, Aim::Both, PASSES.0, NONE_LEFT * NONE_LEFT);
+                self.fit.plans = trial.plans;
+                if let Some(cost) = cost
+                    && best.as_ref().is_none_or(|(least, _)| cost < *least)
+                {
+                    best = Some((cost, trial));
+                }
+            }
+            let Some((cost, trial)) = best.filter(|(cost, _)| *cost < BETTER_SHARE * self.cost) else { return };
+            let plans = self.fit.plans;
+            (self.fit, self.cost) = (trial, cost);
+            self.fit.plans = plans;
+            self.refine(true);
         }
     }
 
