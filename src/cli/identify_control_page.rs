@@ -4,7 +4,7 @@
 //! runs no script.
 
 use super::identify_control::control_text;
-use super::identify_page::{BOTTOM, LEFT, MARGIN, WIDTH, whole};
+use super::identify_page::{BOTTOM, LEFT, MARGIN, WIDTH, label_below, whole};
 use crate::base::units::mm_min_from_mm_s;
 use crate::identify::{ControlResult, FeedOverPath};
 use crate::report::escape;
@@ -39,9 +39,9 @@ fn drawing(feeds: &FeedOverPath) -> String {
         svg += &format!("<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>", WIDTH - MARGIN);
         let feed = mm_min_from_mm_s(share * highest);
         svg += &format!("<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{feed:.0}</text>\n", LEFT - 6.0, y + 4.0);
-        let x = LEFT + width * share;
+        let (x, anchor) = label_below(LEFT + width * share);
         svg += &format!(
-            "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{:.1} mm</text>\n",
+            "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"{anchor}\">{:.1} mm</text>\n",
             HEIGHT - 14.0,
             share * feeds.length_mm
         );

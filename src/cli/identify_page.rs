@@ -3,7 +3,7 @@
 //! In: results. Out: one HTML document, drawings inside it, light or dark as the reader's system is. Loads nothing, runs no script.
 
 use super::identify_tables::{axis_of, number};
-use crate::identify::{AxisResult, Estimate};
+use crate::identify::{AxisResult, Estimate, Parameter};
 use crate::machine::{Axis, Machine};
 use crate::report::escape;
 use std::path::PathBuf;
@@ -14,6 +14,8 @@ pub(super) const LEFT: f64 = 70.0;
 pub(super) const MARGIN: f64 = 14.0;
 pub(super) const BOTTOM: f64 = 34.0;
 const HEIGHT: f64 = 260.0;
+/// Half of the longest label below a drawing.
+const LABEL: f64 = 40.0;
 
 /// Of every page of identify: three colours of lines, a, b and c.
 const STYLE: &str = "\
@@ -23,7 +25,7 @@ body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)
 svg{width:100%;height:auto;display:block}svg text{fill:var(--ink);font:11px system-ui,sans-serif}.grid{stroke:var(--grid);stroke-width:1}";
 const OF_AXES: &str = "\
 .law{fill:none;stroke:var(--b);stroke-width:1.8}.point{fill:var(--a)}.table{overflow-x:auto}table{border-collapse:collapse}\
-td,th{padding:.15rem .9rem .15rem 0;text-align:left}td.n{text-align:right;font-variant-numeric:tabular-nums}";
+td,th{padding:.15rem .9rem .15rem 0;text-align:left}.n.n{text-align:right;font-variant-numeric:tabular-nums}";
 
 /// A document with that style and more of it; the title is escaped already.
 pub(super) fn whole(title: &str, style: &str, body: &str) -> String {
@@ -54,7 +56,7 @@ fn section(result: &AxisResult, axis: &Axis) -> String {
     if result.estimates.is_empty() {
         text += "<p>Nothing could be identified.</p>\n";
     } else {
-        text += "<div class=\"table\"><table><tr><th></th><th>value</th><th>from</th><th>to</th><th>unit</th><th>by</th></tr>\n";
+        text += "<div class=\"table\"><table><tr><th></th><th class=\"n\">value</th><th class=\"n\">from</th><th class=\"n\">to</th><th>unit</th><th>by</th></tr>\n";
         for estimate in &result.estimates {
             text += &row(estimate, axis);
         }
@@ -75,7 +77,7 @@ fn section(result: &AxisResult, axis: &Axis) -> String {
     if result.friction_points.len() > 1 {
         text += "<h3>Friction and gravity over the speed of the motor</h3>\n";
         text += "<p>Points: mean torque of the trace without that of the inertia. Line: the law that was fitted.</p>\n";
-        text += &drawing(&result.friction_points);
+        text += &drawing(&result.friction_points, Parameter::Coulomb.unit(axis));
     }
     text
 }
@@ -94,8 +96,14 @@ fn row(estimate: &Estimate, axis: &Axis) -> String {
     )
 }
 
-/// Torque over speed: points and law.
-fn drawing(points: &[[f64; 3]]) -> String {
+/// Where a label below a drawing stands: in the middle below its place, the last one inside the page.
+pub(super) fn label_below(x: f64) -> (f64, &'static str) {
+    if x > WIDTH - LABEL { (WIDTH - 1.0, "end") } else { (x, "middle") }
+}
+
+/// Torque over speed: points and law. With a linear motor these are N over m/s.
+fn drawing(points: &[[f64; 3]], unit: &str) -> String {
+    let speed_unit = if unit == "N" { "m/s" } else { "rad/s" };
     let bounds = |of: &dyn Fn(&[f64; 3]) -> [f64; 2]| {
         let all = || points.iter().flat_map(of).filter(|value| value.is_finite());
         let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
@@ -109,14 +117,18 @@ fn drawing(points: &[[f64; 3]]) -> String {
     for torque in [lowest, 0.0, highest] {
         let at = y(torque);
         svg += &format!("<line class=\"grid\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>", WIDTH - MARGIN);
-        svg +=
-            &format!("<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{torque:.3} N m</text>\n", LEFT - 6.0, at + 4.0);
+        svg += &format!(
+            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{torque:.3} {unit}</text>\n",
+            LEFT - 6.0,
+            at + 4.0
+        );
     }
     for speed in [slowest, 0.0, fastest] {
         let at = x(speed);
         svg +=
             &format!("<line class=\"grid\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{MARGIN}\" y2=\"{}\"/>", HEIGHT - BOTTOM);
-        svg += &format!("<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{speed:.1} rad/s</text>\n", HEIGHT - 14.0);
+        let ((at, anchor), below) = (label_below(at), HEIGHT - 14.0);
+        svg += &format!("<text x=\"{at:.1}\" y=\"{below}\" text-anchor=\"{anchor}\">{speed:.1} {speed_unit}</text>\n");
     }
     // The law jumps at a standstill.
     for side in [-1.0, 1.0] {

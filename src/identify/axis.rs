@@ -7,6 +7,7 @@ use super::aliasing::folding;
 use super::choice::{Chosen, chosen};
 use super::feedforward::{controllers, left_out};
 use super::friction::{Mechanics, one_shot};
+use super::plausible::{self, UNITS};
 use super::record::{AxisRecord, read};
 use super::refine::refine;
 use super::speed_loop::speed_loop;
@@ -86,17 +87,28 @@ fn one_axis(
         return Err(finding);
     }
     result.verdicts.extend(unreadable.into_iter().map(|finding| format!("{}: left out", finding.message)));
+    let mut contradictions = Vec::new();
+    records.retain(|record| {
+        let reason = plausible::contradiction(record, axis, data);
+        contradictions.extend(reason.iter().map(|reason| format!("`{}`: {reason}", record.trace)));
+        reason.is_none()
+    });
     if records.is_empty() {
-        for parameter in Parameter::ALL {
-            result.refuse(
-                parameter,
-                "no trace has a signal of this axis",
-                "record this axis, or name it with --axis-name 7=X",
-            );
+        let (reason, remedy) = contradictions.pop().map_or_else(|| nothing_of(traces, axis), |reason| (reason, UNITS));
+        return Ok(all_refused(result, &reason, remedy));
+    }
+    result.verdicts.extend(contradictions.into_iter().map(|reason| format!("{reason}: left out")));
+    result.verdicts.extend(unknown_of(traces, axis));
+    for record in &records {
+        if let Some([from_s, length_s]) = record.gap_s {
+            let name = &record.trace;
+            result.verdicts.push(format!(
+                "`{name}` has no samples for {length_s:.3} s from {from_s:.3} s on: what lies around is left out"
+            ));
         }
-        return Ok(result);
     }
     let mut found = controllers(&records, axis, data, cycle_s, &mut result);
+    plausible::controllers(&mut found, &mut result);
     let speed_cycle_s = machine.cycle.time_base.seconds(data.speed_cycle_ticks);
     found.extend(speed_loop(&records, data, speed_cycle_s, &mut result));
     // A simulation of the controllers has what the traces told of them.
@@ -104,6 +116,9 @@ fn one_axis(
     let told =
         DriveData { identified: data.identified || found.iter().any(|e| e.parameter == Parameter::SpeedGain), ..told };
     let (mechanics, records) = mechanics(&records, machine, axis, &told, &mut result);
+    if let Some(reason) = plausible::too_heavy(mechanics.value(Parameter::Inertia), axis, data) {
+        return Ok(all_refused(result, &reason, UNITS));
+    }
     let refined = if options.linear_only {
         None
     } else {
@@ -119,6 +134,52 @@ fn one_axis(
     }
     finish(&mut result, found);
     Ok(result)
+}
+
+/// Nothing is told of an axis, and why.
+fn all_refused(mut result: AxisResult, reason: &str, remedy: &str) -> AxisResult {
+    result.refusals.clear();
+    result.others.clear();
+    result.figures.clear();
+    for parameter in Parameter::ALL {
+        result.refuse(parameter, reason, remedy);
+    }
+    result
+}
+
+/// Signals of an axis that are not known.
+fn unknown_of(traces: &[Trace], axis: &Axis) -> Option<String> {
+    let start = format!("{}.", axis.name);
+    let unknown = |signal: &&crate::trace::Signal| signal.name.is_none() && signal.original.starts_with(&start);
+    let signals = traces.iter().flat_map(|trace| &trace.signals).filter(unknown);
+    let names: Vec<&str> = signals.map(|signal| signal.original.as_str()).take(NAMES_MAX).collect();
+    (!names.is_empty()).then(|| format!("not known, and not used: {} (--map tells what they are)", names.join(", ")))
+}
+
+/// Names of signals that are told at most.
+const NAMES_MAX: usize = 8;
+
+/// Why no trace has anything of an axis.
+fn nothing_of(traces: &[Trace], axis: &Axis) -> (String, &'static str) {
+    let name = &axis.name;
+    let of_axis = |trace: &Trace| trace.axes().contains(&name.as_str());
+    if traces.iter().any(of_axis) {
+        let reason = format!("{name} has less than two samples of a position, a current or a torque");
+        return (reason, "record position and current over a motion (`sollwert identify --plan`)");
+    }
+    let others: Vec<&str> =
+        traces.iter().flat_map(|trace| &trace.signals).map(|signal| signal.original.as_str()).collect();
+    let reason = match others.len() {
+        0 => "no trace has a signal of this axis, nor of any other".to_owned(),
+        count => {
+            let more = if count > NAMES_MAX { ", ..." } else { "" };
+            format!("no trace has a signal of this axis: there are {}{more}", others[..count.min(NAMES_MAX)].join(", "))
+        }
+    };
+    (
+        reason,
+        "record this axis, or name it with --axis-name 7=X and its signals with --map; lengths are in mm, or in what a row of units says",
+    )
 }
 
 /// The drive with what was found about its controllers.

@@ -26,10 +26,14 @@ const NONE_LEFT: f64 = 1e-3;
 const MUCH_LEFT: f64 = 0.01;
 /// Another word must leave less than this share of the cost over.
 const BETTER_SHARE: f64 = 0.8;
+/// Share of the cost by which two windows differ that are one.
+const SAME_SHARE: f64 = 1e-3;
 /// RMS of ln(feed) from which two words drive differently.
 const DIFFERS: f64 = 1e-3;
 /// Windows that are tried first.
 const WINDOWS: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 1000];
+/// A window that leaves less than this share of the cost over explains more of the motion than numbers do.
+const FAR_BETTER_SHARE: f64 = 0.5;
 /// Windows between two of those that are tried at once.
 const BETWEEN: usize = 4;
 /// Other numbers to begin from: radial shares of acceleration and jerk, factors on transition jerk and jerk.
@@ -58,13 +62,16 @@ pub(super) struct Search<'a, 'b> {
     axes: Vec<AxisId>,
     /// The numbers of the present words are those of each axis.
     per_axis: bool,
+    /// Window of the file.
+    file_blocks: usize,
     progress: &'b mut dyn FnMut(&str),
 }
 
 impl<'a, 'b> Search<'a, 'b> {
     /// `None` where the machine as it is ends in an alarm.
     pub(super) fn new(fit: Fit<'a>, axes: Vec<AxisId>, progress: &'b mut dyn FnMut(&str)) -> Option<Self> {
-        let mut search = Self { fit, cost: f64::INFINITY, axes, per_axis: false, progress };
+        let file_blocks = fit.machine.look_ahead_blocks;
+        let mut search = Self { fit, cost: f64::INFINITY, axes, per_axis: false, file_blocks, progress };
         search.cost = search.fit.cost(Aim::Both)?;
         Some(search)
     }
@@ -72,11 +79,16 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Knobs under the words of `machine`: of time with one jerk for all axes, or those of the shape too and a jerk for each axis. The path of
     /// set-points a cycle apart is a polyline that depends on the feed: what the shape is worth is known when the feed is.
     fn knobs_of(&self, machine: &Machine, per_axis: bool) -> Vec<Knob> {
+        let shape = if per_axis { &Knob::SHAPE[..] } else { &[] };
+        shape.iter().copied().chain(self.knobs_of_time(machine, per_axis)).collect()
+    }
+
+    fn knobs_of_time(&self, machine: &Machine, per_axis: bool) -> Vec<Knob> {
         let step = match machine.feed.corner_rule {
             CornerRule::FollowUp => Knob::FollowUp,
             CornerRule::Overload => Knob::Overload,
         };
-        let mut knobs = if per_axis { Knob::SHAPE.to_vec() } else { Vec::new() };
+        let mut knobs = Vec::new();
         // The law of the least time knows the true sums of the axes, no shares.
         if machine.feed.time_law != TimeLawKind::Continuous {
             knobs.extend([Knob::RadialAcceleration, Knob::RadialJerk]);
@@ -125,6 +137,14 @@ impl<'a, 'b> Search<'a, 'b> {
             self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&machine)));
             let knobs = self.knobs_of(&machine, false);
             let mut trial = Fit { machine, plans: self.fit.plans, ..start.clone() };
+            // Numbers fitted under a window that is far off make up for it, and no window fits them any more: a far better one comes first.
+            let costs = window_costs(&mut trial);
+            let now = costs.iter().find(|(blocks, _)| *blocks == trial.machine.look_ahead_blocks).map(|now| now.1);
+            if let Some((blocks, cost)) = least(&costs).map(|best| costs[best])
+                && now.is_none_or(|now| cost < FAR_BETTER_SHARE * now)
+            {
+                trial.machine.look_ahead_blocks = blocks;
+            }
             let enough = NONE_LEFT * NONE_LEFT;
             let mut cost = trial.run(&knobs, Aim::Both, FIRST_STEPS, enough);
             // One that does not come near in a few steps is the wrong one.
@@ -165,12 +185,61 @@ impl<'a, 'b> Search<'a, 'b> {
         self.refine(false);
         self.window();
         if self.left() > NONE_LEFT {
+            // Twelve numbers at once find their way from near the end of it only.
+            self.say("time along the path, with the shape");
+            let knobs: Vec<Knob> =
+                Knob::SHAPE.into_iter().chain(self.knobs_of_time(&self.fit.machine, false)).collect();
+            if let Some(cost) = self.fit.run(&knobs, Aim::Both, PASSES.1, NONE_LEFT * NONE_LEFT) {
+                self.cost = cost;
+            }
+        }
+        if self.left() > NONE_LEFT {
             self.say("time along the path, axis by axis");
             self.per_axis = true;
             self.refine(true);
             if self.window() {
                 self.refine(true);
             }
+            self.windows_beside();
+        }
+    }
+
+    /// Windows beside the present one and that of the file, each with numbers fitted to it: numbers that were fitted under a wrong one make up for a part of it, so that
+    /// with them no other looks better.
+    fn windows_beside(&mut self) {
+        for _ in 0..ROUNDS {
+            if self.done() {
+                return;
+            }
+            self.say("windows beside");
+            let now = self.fit.machine.look_ahead_blocks;
+            let mut beside = vec![self.file_blocks, now.saturating_sub(1).max(1), now + 1];
+            beside.sort_unstable();
+            beside.dedup();
+            beside.retain(|blocks| *blocks != now);
+            let (knobs, limit) = (self.knobs_of(&self.fit.machine, true), self.cost);
+            // One that moves the program in the same way needs no fit.
+            let differs = |cost: f64| (cost / limit - 1.0).abs() > SAME_SHARE;
+            let mut best: Option<(f64, Fit<'a>)> = None;
+            for (blocks, cost) in costs_of(&mut self.fit, &beside) {
+                if !differs(cost) {
+                    continue;
+                }
+                let machine = Machine { look_ahead_blocks: blocks, ..self.fit.machine.clone() };
+                let mut trial = Fit { machine, ..self.fit.clone() };
+                let cost = trial.run(&knobs, Aim::Both, PASSES.0, NONE_LEFT * NONE_LEFT);
+                self.fit.plans = trial.plans;
+                if let Some(cost) = cost
+                    && best.as_ref().is_none_or(|(least, _)| cost < *least)
+                {
+                    best = Some((cost, trial));
+                }
+            }
+            let Some((cost, trial)) = best.filter(|(cost, _)| *cost < BETTER_SHARE * self.cost) else { return };
+            let plans = self.fit.plans;
+            (self.fit, self.cost) = (trial, cost);
+            self.fit.plans = plans;
+            self.refine(true);
         }
     }
 
@@ -269,46 +338,13 @@ impl<'a, 'b> Search<'a, 'b> {
         }
     }
 
-    /// Costs of some windows at the present numbers.
-    fn costs(&mut self, windows: &[usize]) -> Vec<(usize, f64)> {
-        let with = |blocks: &usize| Machine { look_ahead_blocks: *blocks, ..self.fit.machine.clone() };
-        let machines: Vec<Machine> = windows.iter().map(with).collect();
-        let costs = self.fit.costs(&machines, Aim::Both);
-        windows.iter().copied().zip(costs).filter_map(|(blocks, cost)| Some((blocks, cost?))).collect()
-    }
-
-    /// Costs of the usual windows and of all of those around the best one, in order.
-    fn window_costs(&mut self) -> Vec<(usize, f64)> {
-        let mut windows = WINDOWS.to_vec();
-        windows.push(self.fit.machine.look_ahead_blocks);
-        windows.sort_unstable();
-        windows.dedup();
-        let mut costs = self.costs(&windows);
-        // A window that ends in an alarm has no cost.
-        let mut tried = windows;
-        loop {
-            let Some(best) = least(&costs) else { return costs };
-            let below = best.checked_sub(1).map_or(costs[best].0, |k| costs[k].0);
-            let above = costs.get(best + 1).map_or(costs[best].0, |next| next.0);
-            let inside: Vec<usize> = (below + 1..above).filter(|blocks| !tried.contains(blocks)).collect();
-            if inside.is_empty() {
-                return costs;
-            }
-            let stride = inside.len().div_ceil(BETWEEN);
-            let more: Vec<usize> = inside.into_iter().step_by(stride).collect();
-            costs.extend(self.costs(&more));
-            tried.extend(more);
-            costs.sort_by_key(|(blocks, _)| *blocks);
-        }
-    }
-
     /// Takes the window that leaves the least over, and fits again; that of the file stays where it is as good.
     fn window(&mut self) -> bool {
         if self.left() <= NONE_LEFT {
             return false;
         }
         self.say("look-ahead window");
-        let costs = self.window_costs();
+        let costs = window_costs(&mut self.fit);
         let Some((blocks, cost)) = least(&costs).map(|best| costs[best]) else { return false };
         let now = costs.iter().find(|(blocks, _)| *blocks == self.fit.machine.look_ahead_blocks);
         let takes = now.is_none_or(|(_, now)| cost < 0.999 * now);
@@ -327,7 +363,7 @@ impl<'a, 'b> Search<'a, 'b> {
         let limit = 1.05 * self.cost + DIFFERS * DIFFERS;
         let mut tried = vec![most, now + 1];
         tried.extend((1..now).rev().take(1).chain(WINDOWS.into_iter().rev().filter(|blocks| blocks + 1 < now)));
-        let costs = self.costs(&tried);
+        let costs = costs_of(&mut self.fit, &tried);
         let of =
             |blocks: usize| costs.iter().find(|(tried, _)| *tried == blocks).is_some_and(|(_, cost)| *cost < limit);
         let below = tried[2..].iter().take_while(|blocks| of(**blocks)).last();
@@ -360,6 +396,39 @@ impl<'a, 'b> Search<'a, 'b> {
             told.push((switch, differences.iter().all(|square| square.is_none_or(|square| square > limit))));
         }
         told
+    }
+}
+
+/// Costs of some windows at the present numbers.
+fn costs_of(fit: &mut Fit<'_>, windows: &[usize]) -> Vec<(usize, f64)> {
+    let with = |blocks: &usize| Machine { look_ahead_blocks: *blocks, ..fit.machine.clone() };
+    let machines: Vec<Machine> = windows.iter().map(with).collect();
+    let costs = fit.costs(&machines, Aim::Both);
+    windows.iter().copied().zip(costs).filter_map(|(blocks, cost)| Some((blocks, cost?))).collect()
+}
+
+/// Costs of the usual windows and of all of those around the best one, in order.
+fn window_costs(fit: &mut Fit<'_>) -> Vec<(usize, f64)> {
+    let mut windows = WINDOWS.to_vec();
+    windows.push(fit.machine.look_ahead_blocks);
+    windows.sort_unstable();
+    windows.dedup();
+    let mut costs = costs_of(fit, &windows);
+    // A window that ends in an alarm has no cost.
+    let mut tried = windows;
+    loop {
+        let Some(best) = least(&costs) else { return costs };
+        let below = best.checked_sub(1).map_or(costs[best].0, |k| costs[k].0);
+        let above = costs.get(best + 1).map_or(costs[best].0, |next| next.0);
+        let inside: Vec<usize> = (below + 1..above).filter(|blocks| !tried.contains(blocks)).collect();
+        if inside.is_empty() {
+            return costs;
+        }
+        let stride = inside.len().div_ceil(BETWEEN);
+        let more: Vec<usize> = inside.into_iter().step_by(stride).collect();
+        costs.extend(costs_of(fit, &more));
+        tried.extend(more);
+        costs.sort_by_key(|(blocks, _)| *blocks);
     }
 }
 

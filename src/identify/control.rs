@@ -89,9 +89,13 @@ pub struct ControlResult {
 }
 
 /// Passes of the fit of the shape alone.
-const SHAPE_PASSES: usize = 15;
+const SHAPE_PASSES: usize = 25;
 /// RMS of the sideways distances in um that is as good as none.
 const SHAPE_NONE_LEFT: f64 = 0.01;
+/// Where else it begins: alpha and the two tolerance ratios.
+const SHAPE_STARTS: [[f64; 3]; 4] = [[2.0, 0.9, 0.9], [1.3, 0.6, 0.6], [3.3, 0.8, 0.8], [2.0, 0.4, 0.4]];
+/// RMS from which it does: end tangents that are too long and a tolerance that is not used to its end leave some tenths of a um.
+const SHAPE_LITTLE_LEFT: f64 = 0.03;
 /// RMS from which another curve is tried.
 const SHAPE_LEFT: f64 = 0.3;
 /// Paths that differ by more than this share of their length are not of one program.
@@ -194,6 +198,18 @@ const MOVED_MM: f64 = 0.1;
 fn shape(fit: &mut Fit<'_>) -> bool {
     let enough = SHAPE_NONE_LEFT * SHAPE_NONE_LEFT;
     let mut cost = fit.run(&Knob::SHAPE, Aim::Shape, SHAPE_PASSES, enough).unwrap_or(f64::INFINITY);
+    for start in SHAPE_STARTS {
+        if cost.sqrt() < SHAPE_LITTLE_LEFT {
+            break;
+        }
+        let mut trial = fit.clone();
+        trial.values = Knob::SHAPE.into_iter().zip(start).collect();
+        let found = trial.run(&Knob::SHAPE, Aim::Shape, SHAPE_PASSES, enough);
+        fit.plans = trial.plans;
+        if let Some(found) = found.filter(|found| *found < cost) {
+            (*fit, cost) = (trial, found);
+        }
+    }
     let mut told = true;
     let others = Switch::Shape.others(&fit.machine);
     let differences = fit.differences(&others, Aim::Shape);

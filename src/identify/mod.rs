@@ -3,7 +3,7 @@
 //! In: traces of any known format ([`Trace`](crate::trace::Trace)), the machine with what is taken as known (torque constant, transmission, cycles). Out:
 //! [`AxisResult`]s: [`Estimate`]s and [`Refusal`]s, keyed like the machine file. What a trace must hold, the method and its formulas stand in
 //! docs/identify.md, in the order of the files here: `record` reads one axis of a trace, `motion` filters it without a shift in time,
-//! `choice` leaves unfit traces out, `normal` solves least squares in blocks (intervals from leaving blocks out), `friction` and `staged` fit the
+//! `plausible` and `choice` leave unfit traces out, `normal` solves least squares in blocks (intervals from leaving blocks out), `friction` and `staged` fit the
 //! mechanics, `beyond` looks at what their law does not have, `aliasing`
 //! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` and
 //! `plan_control` write the programs to record. `profile`, `knobs`,
@@ -24,6 +24,7 @@ mod motion;
 mod normal;
 mod plan;
 mod plan_control;
+mod plausible;
 mod profile;
 mod record;
 mod refine;

@@ -186,7 +186,7 @@ impl PathProfile {
             let way = lengths[at + 1] - lengths[at];
             let share = if way > 0.0 { ((wanted - lengths[at]) / way).clamp(0.0, 1.0) } else { 0.0 };
             times.push((at as f64 + share) * period_s);
-            borders.push(places[at].iter().zip(&places[at + 1]).map(|(a, b)| a + share * (b - a)).collect());
+            borders.push(between(places, at, share));
         }
         let cell_mm = length_mm / CELLS as f64;
         let feeds_mm_s = times.windows(2).map(|pair| cell_mm / (pair[1] - pair[0]).max(1e-9)).collect();
@@ -249,4 +249,20 @@ impl PathProfile {
         let square: f64 = self.sideways_mm(reference).iter().map(|off| off * off).sum();
         (square / (CELLS + 1) as f64).sqrt()
     }
+}
+
+/// The place at a share of the time from one set-point to the next: a cubic through both with the slopes of their neighbours. The straight line between them
+/// cuts a bend by as much as the shapes of corners differ (1 um at 50 mm/s and 1 ms in a radius of 0.3 mm), and by another amount at another feed.
+fn between(places: &[Vec<f64>], at: usize, share: f64) -> Vec<f64> {
+    let (Some(from), Some(to)) = (places.get(at), places.get(at + 1)) else {
+        return places.last().cloned().unwrap_or_default();
+    };
+    let before = at.checked_sub(1).and_then(|k| places.get(k)).unwrap_or(from);
+    let after = places.get(at + 2).unwrap_or(to);
+    let u = share;
+    let cubic = |(((a, b), c), d): (((&f64, &f64), &f64), &f64)| {
+        let (slope, bend) = (0.5 * (c - a), a - 2.5 * b + 2.0 * c - 0.5 * d);
+        b + u * (slope + u * (bend + u * (1.5 * (b - c) + 0.5 * (d - a))))
+    };
+    before.iter().zip(from).zip(to).zip(after).map(cubic).collect()
 }

@@ -20,6 +20,8 @@ pub(super) struct AxisRecord {
     pub(super) period_s: f64,
     /// Rows.
     pub(super) count: usize,
+    /// Start and length of the longest time without samples.
+    pub(super) gap_s: Option<[f64; 2]>,
     /// x_set.
     pub(super) setpoint_lu: Option<Vec<f64>>,
     /// x_meas.
@@ -58,6 +60,7 @@ impl AxisRecord {
             trace: self.trace.clone(),
             period_s: self.period_s,
             count: self.count.saturating_sub(row),
+            gap_s: self.gap_s,
             setpoint_lu: cut(&self.setpoint_lu),
             position_lu: cut(&self.position_lu),
             position_from: self.position_from,
@@ -91,6 +94,9 @@ pub(super) struct FineRecord {
     pub(super) torque_feedforward_n_m: Option<Vec<f64>>,
 }
 
+/// Sampling periods without a sample from which on nothing stands between two of them.
+const GAP_PERIODS: f64 = 3.0;
+
 /// Rows of one axis at most: some hours at 1 ms.
 const ROWS_MAX: usize = 20_000_000;
 
@@ -117,7 +123,13 @@ impl Reader<'_> {
             // A signal of the position controller stands in the file when it changes; any other is a sample of something smooth.
             let method = if signal.clock == Clock::Servo { Method::Hold } else { Method::Linear };
             let times: Vec<f64> = self.times.iter().map(|time_s| time_s + signal.meaning.delay_s).collect();
-            signal.resampled(&times, method)
+            let mut values = signal.resampled(&times, method);
+            for [from_s, to_s] in gaps(signal) {
+                let (first, last) =
+                    (times.partition_point(|time_s| *time_s <= from_s), times.partition_point(|time_s| *time_s < to_s));
+                values.iter_mut().take(last).skip(first).for_each(|value| *value = f64::NAN);
+            }
+            values
         };
         values.iter().any(|value| value.is_finite()).then_some(values)
     }
@@ -148,13 +160,32 @@ pub(crate) fn unwrap(angles: &mut [f64], turn: f64) {
     }
 }
 
-/// The grid of the axis: that of its position signals, of the position controller if there is a choice.
-fn grid<'t>(trace: &'t Trace, axis: &Axis) -> Option<&'t TimeGrid> {
+/// Times without samples, of a signal that is sampled (one of the position controller may stand in the file when it changes).
+fn gaps(signal: &Signal) -> Vec<[f64; 2]> {
+    let (TimeGrid::Explicit(times), Some(period_s)) = (&signal.times, signal.times.period_s()) else {
+        return Vec::new();
+    };
+    if signal.clock == Clock::Servo {
+        return Vec::new();
+    }
+    times.windows(2).filter(|pair| pair[1] - pair[0] > GAP_PERIODS * period_s).map(|pair| [pair[0], pair[1]]).collect()
+}
+
+/// The signal whose grid is that of the axis: one of its positions, of the position controller if there is a choice.
+fn timed<'t>(trace: &'t Trace, axis: &Axis) -> Option<&'t Signal> {
     let of = |stem: &&str| trace.axis_signal(&axis.name, stem).filter(|signal| signal.len() > 1);
-    let stems = ["position_setpoint", "position_measured", "position_actual", "following_error", "current"];
+    let stems = [
+        "position_setpoint",
+        "position_measured",
+        "position_actual",
+        "following_error",
+        "current",
+        "current_mean",
+        "torque_reference",
+    ];
     let signals: Vec<&Signal> = stems.iter().filter_map(of).collect();
     let servo = signals.iter().find(|signal| signal.clock != Clock::Interpolator);
-    servo.or(signals.first()).map(|signal| &signal.times)
+    servo.or(signals.first()).copied()
 }
 
 /// Reads one axis; `Ok(None)` if the trace has nothing of it.
@@ -164,7 +195,8 @@ pub(super) fn read(
     data: &DriveData,
     cycle_s: f64,
 ) -> Result<Option<AxisRecord>, Diagnostic> {
-    let Some(grid) = grid(trace, axis) else { return Ok(None) };
+    let Some(signal) = timed(trace, axis) else { return Ok(None) };
+    let grid = &signal.times;
     let (Some(start_s), Some(end_s), Some(period_s)) = (grid.start_s(), grid.end_s(), grid.period_s()) else {
         return Ok(None);
     };
@@ -177,7 +209,9 @@ pub(super) fn read(
     }
     let times = (0..rows as usize).map(|k| start_s + k as f64 * period_s).collect();
     let reader = Reader { trace, axis, times, grid: grid.clone() };
-    Ok(Some(at_position_cycle(&reader, data, period_s, cycle_s)))
+    let longest = gaps(signal).into_iter().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+    let gap_s = longest.map(|[from_s, to_s]| [from_s, to_s - from_s]);
+    Ok(Some(AxisRecord { gap_s, ..at_position_cycle(&reader, data, period_s, cycle_s) }))
 }
 
 fn at_position_cycle(reader: &Reader<'_>, data: &DriveData, period_s: f64, cycle_s: f64) -> AxisRecord {
@@ -200,6 +234,7 @@ fn at_position_cycle(reader: &Reader<'_>, data: &DriveData, period_s: f64, cycle
         trace: reader.trace.name.clone(),
         period_s: if finer { cycle_s } else { period_s },
         count: reader.times.len().div_ceil(every),
+        gap_s: None,
         velocity_command_lu_s: length("velocity_command").or_else(from_motor),
         velocity_feedforward_lu_s: length("velocity_feedforward"),
         // In our recordings that is the analytic velocity of the interpolator, before any filter.

@@ -30,8 +30,9 @@ pub(super) enum Aim {
     Both,
 }
 
-/// Step of a free number for the differences: wide enough to see through the grain of the set-point cycle.
-const STEP: f64 = 0.02;
+/// Steps of a free number for the differences: wide enough to see through the grain of the set-point cycle; where that leads no further, wider ones see past the
+/// bends of limits that take turns, and narrower ones along them.
+const STEPS: [f64; 3] = [0.02, 0.06, 0.007];
 /// The same for what is told: wide enough to see where a limit ceases to hold.
 const SIDE_STEP: f64 = 0.1;
 /// Longest step of a free number in one pass: the law is bent.
@@ -46,7 +47,7 @@ const FLOOR_SHARE: f64 = 0.2;
 const DAMPING: (f64, f64, f64) = (1e-3, 1e-7, 1e3);
 const WORSE: f64 = 10.0;
 const BETTER: f64 = 0.1;
-/// A pass that gains less than this share of the cost was the last; one with carried columns asks for new ones below the other share.
+/// A pass that gains less than this share of the cost was the last with its differences; one with carried columns asks for new ones below the other share.
 const GAIN_SHARE: f64 = 1e-2;
 const SLOW_SHARE: f64 = 0.1;
 /// Pairs of dampings that are tried at most.
@@ -140,14 +141,14 @@ impl Fit<'_> {
     }
 
     /// Columns d residuals / d free number.
-    fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim) -> Vec<Option<Vec<f64>>> {
+    fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim, wide: f64) -> Vec<Option<Vec<f64>>> {
         let step = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
-            // Towards the middle of the range where there is an end of it.
-            if knob.value(now + STEP) > knob.value(now) * (1.0 + STEP / 1e3) { STEP } else { -STEP }
+            // Towards the middle of the range where there is an end of it within the step.
+            if knob.free(knob.value(now + wide)) > now + wide / 2.0 { wide } else { -wide }
         };
         let steps: Vec<f64> = knobs.iter().map(step).collect();
-        let of = |knob: &Knob| knobs.iter().position(|known| known == knob).map_or(STEP, |place| steps[place]);
+        let of = |knob: &Knob| knobs.iter().position(|known| known == knob).map_or(wide, |place| steps[place]);
         self.slopes(base, knobs, aim, of)
     }
 
@@ -164,7 +165,7 @@ impl Fit<'_> {
             let now = knob.free(self.value(*knob));
             let moved = knob.value(now + step(knob));
             let by = knob.free(moved) - now;
-            if by.abs() < 0.5 * STEP {
+            if by.abs() < 0.5 * step(knob).abs() {
                 return None;
             }
             let residuals = self.residuals(&self.with(&[(*knob, moved)]), aim)?;
@@ -189,8 +190,9 @@ impl Fit<'_> {
         let mut base = self.residuals(&self.values, aim)?;
         let mut damping = DAMPING.0;
         let mut columns: Option<Vec<Option<Vec<f64>>>> = None;
-        let mut fresh = false;
+        let (mut fresh, mut wide) = (false, 0);
         for _ in 0..passes {
+            let Some(step) = STEPS.get(wide) else { break };
             let before = square(&base) + pull(&free);
             if square(&base) < enough {
                 break;
@@ -199,7 +201,7 @@ impl Fit<'_> {
                 Some(carried) => carried,
                 None => {
                     fresh = true;
-                    self.columns(&base, knobs, aim)
+                    self.columns(&base, knobs, aim, *step)
                 }
             };
             let step = self.step(
@@ -211,22 +213,21 @@ impl Fit<'_> {
                 fresh,
             );
             let Some((values, residuals, trial, eased)) = step else {
-                if fresh {
-                    break;
-                }
+                wide += usize::from(fresh);
                 damping = DAMPING.0;
                 continue;
             };
             damping = eased;
             let gained = before - square(&residuals) - pull(&trial);
             let moved: Vec<f64> = trial.iter().zip(&free).map(|(new, old)| new - old).collect();
-            columns = Some(carried(slopes, &base, &residuals, &moved));
+            // The path is quick to plan again, and too bent in its three numbers for columns that are carried on.
+            columns = (aim != Aim::Shape).then(|| carried(slopes, &base, &residuals, &moved));
             (self.values, base, free) = (values, residuals, trial);
             if gained < if fresh { GAIN_SHARE } else { SLOW_SHARE } * before {
-                if fresh {
-                    break;
-                }
+                wide += usize::from(fresh);
                 columns = None;
+            } else if gained > SLOW_SHARE * before {
+                wide = 0;
             }
             fresh = false;
         }
@@ -247,7 +248,7 @@ impl Fit<'_> {
         let (gram, gradient) = normal(columns, at.base, at.free, at.origin);
         let trial = |damping: f64| {
             let damped = &gram + DMatrix::from_diagonal(&gram.diagonal().map(|d| damping * (d + PULL * PULL)));
-            let step = damped.cholesky()?.solve(&gradient);
+            let step = inside(&damped, &gradient, at.free, knobs)?;
             let free = (at.free.iter().zip(&step).zip(knobs))
                 .map(|((f, s), knob)| knob.free(knob.value(f - s.clamp(-STEP_MAX, STEP_MAX))))
                 .collect::<Vec<f64>>();
@@ -318,6 +319,37 @@ impl Told {
         let others = self.places.iter().enumerate().filter_map(|(k, place)| Some((k, (*place)?)));
         let best = others.filter(|(k, _)| *k != knob).max_by(|a, b| alike(a.1).total_cmp(&alike(b.1)))?;
         (alike(best.1) > ALIKE).then_some(best.0)
+    }
+}
+
+/// The step of the normal equations that stays inside the ranges: what would leave its range goes to the end of it, and the others are solved again with that. Cut
+/// off alone, it would leave the others where they belong only together with it.
+fn inside(damped: &DMatrix<f64>, gradient: &DVector<f64>, free: &[f64], knobs: &[Knob]) -> Option<Vec<f64>> {
+    let p = knobs.len();
+    let mut held: Vec<Option<f64>> = vec![None; p];
+    loop {
+        let open: Vec<usize> = (0..p).filter(|k| held[*k].is_none()).collect();
+        let moved = |k: usize| held[k].unwrap_or(0.0);
+        if open.is_empty() {
+            return Some((0..p).map(moved).collect());
+        }
+        let right = DVector::from_fn(open.len(), |i, _| {
+            gradient[open[i]] - (0..p).map(|k| damped[(open[i], k)] * moved(k)).sum::<f64>()
+        });
+        let left = DMatrix::from_fn(open.len(), open.len(), |i, j| damped[(open[i], open[j])]);
+        let solved = left.cholesky()?.solve(&right);
+        let mut step: Vec<f64> = (0..p).map(moved).collect();
+        let mut leaves = false;
+        for (k, by) in open.iter().zip(&solved) {
+            let end = knobs[*k].free(knobs[*k].value(free[*k] - by));
+            step[*k] = *by;
+            if (free[*k] - by - end).abs() > 1e-9 {
+                (held[*k], leaves) = (Some(free[*k] - end), true);
+            }
+        }
+        if !leaves {
+            return Some(step);
+        }
     }
 }
 

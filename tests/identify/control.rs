@@ -196,6 +196,7 @@ fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
         traces.iter().zip(&texts).map(|(trace, text)| TracedProgram { trace, setup: setup(text) }).collect();
     let result =
         calibrate(&pairs[..1], &pairs[1..], &start, &mut progress()).unwrap_or_else(|d| panic!("{}", d.render(false)));
+    let mut missed = Vec::new();
     for ((before, after), text) in result.agreements.iter().zip(&texts) {
         let percent = |a: &Agreement| 100.0 * (a.planned_s / a.traced_s - 1.0);
         println!(
@@ -209,9 +210,11 @@ fn predicted(truth: &[&str], fitted: &str, unseen: &[&str]) -> ControlResult {
             after.path_rms_mm
         );
         // What users need: cycle time within 1 %, feed profile within 3 % of F RMS.
-        assert!(percent(after).abs() < 1.0, "{after:?}\n{text}\n{result:?}");
-        assert!(after.feed_rms_share < 0.03, "{after:?}\n{text}\n{result:?}");
+        if percent(after).abs() > 1.0 || after.feed_rms_share > 0.03 {
+            missed.push(format!("{after:?}\n{text}"));
+        }
     }
+    assert!(missed.is_empty(), "{missed:?}\n{result:?}");
     result
 }
 
@@ -301,6 +304,18 @@ fn a_look_ahead_of_25_blocks_is_found() {
 fn another_blend_law_is_found() {
     let result = quickly(CASES[6].sets, QUICK);
     assert!(result.choices.contains(&("smoothing.blend_law", "entry".to_owned())), "{:?}", result.choices);
+}
+
+/// Both ratios stand at the end of what they may be: there the fit must not stop beside them.
+#[test]
+fn a_control_that_uses_the_whole_tolerance_is_found() {
+    let result = quickly(CASES[5].sets, FITTED);
+    for key in ["smoothing.tolerance_ratio", "smoothing.tolerance_ratio_reversal"] {
+        let estimate = result.estimates.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{key}: {result:?}"));
+        assert!((estimate.value - 1.0).abs() < 0.01, "{estimate:?}");
+    }
+    let alpha = result.estimates.iter().find(|e| e.key == "smoothing.alpha").unwrap_or_else(|| panic!("{result:?}"));
+    assert!((alpha.value / 2.5 - 1.0).abs() < 0.02, "{alpha:?}");
 }
 
 /// The trace of set-points as that of a control that records the feed along the path alone.

@@ -11,6 +11,7 @@ mod control;
 mod machines;
 mod made;
 mod other_plant;
+mod other_plant_tells;
 mod refusals;
 mod speed_loop;
 mod stranger;

@@ -159,6 +159,99 @@ fn a_machine_file_keeps_comments_and_order() {
     assert!(written.contains("identified = true"));
 }
 
+/// The only axis of such traces, or that of the others where one of them is not in the units that it says.
+fn by(traces: &[sollwert::trace::Trace]) -> AxisResult {
+    let machine = machine("spinner_mvc850", &[]);
+    let options = IdentifyOptions { axes: Vec::new(), linear_only: true };
+    identify(traces, &machine, &options, &mut |_| {}).expect("one axis").remove(0)
+}
+
+/// The same with the values of some signals times a factor.
+fn times(trace: &sollwert::trace::Trace, of: &str, factor: f64) -> sollwert::trace::Trace {
+    let mut trace = trace.clone();
+    for signal in trace.signals.iter_mut().filter(|signal| signal.original.contains(of)) {
+        signal.values.iter_mut().for_each(|value| *value *= factor);
+    }
+    sollwert::trace::Trace { name: "other units".to_owned(), ..trace }
+}
+
+#[test]
+fn traces_in_other_units_are_refused_with_what_contradicts_them() {
+    let good = named("good", &legs(), &ALL);
+    for (of, factor, word) in [
+        ("_mm", 1.0 / 25.4, "inches taken for mm"),
+        ("_mm", 1000.0, "the trace moves X at"),
+        ("current_mean", 1000.0, "the drive of the machine file at most 28 A"),
+    ] {
+        let bad = times(&good, of, factor);
+        let result = by(std::slice::from_ref(&bad));
+        assert!(result.estimates.is_empty(), "{of} {factor}: {:?}", result.estimates);
+        for parameter in Parameter::ALL {
+            refused(&result, parameter, word);
+        }
+    }
+    // Positions and speeds that do not belong to each other: an inch in one of them alone.
+    let result = by(&[times(&good, "position_", 1.0 / 10.0)]);
+    refused(&result, Parameter::VelocityFeedforward, "10.0");
+    refused(&result, Parameter::PositionGain, "not in the units");
+    // Beside a good trace the bad one is left out, and said.
+    let [alone, beside] = [by(std::slice::from_ref(&good)), by(&[times(&good, "current_mean", 1000.0), good])];
+    assert_eq!(alone.estimates, beside.estimates);
+    assert!(beside.verdicts.iter().any(|verdict| verdict.contains("at most 28 A") && verdict.ends_with("left out")));
+}
+
+#[test]
+fn a_gap_is_left_out_and_said_and_unknown_signals_are_named() {
+    let mut trace = named("gappy", &legs(), &ALL);
+    let count = trace.signals[0].values.len();
+    let kept: Vec<usize> = (0..count).filter(|k| !(1200..1900).contains(k)).collect();
+    let clock: std::sync::Arc<[f64]> = kept.iter().map(|k| *k as f64 * 1e-3).collect();
+    for signal in &mut trace.signals {
+        signal.values = kept.iter().map(|k| signal.values[*k]).collect();
+        signal.times = sollwert::trace::TimeGrid::Explicit(clock.clone());
+        signal.clock = sollwert::trace::Clock::Other;
+    }
+    let inch = sollwert::trace::Signal {
+        name: None,
+        original: "X.position_setpoint_in".to_owned(),
+        ..trace.signals[0].clone()
+    };
+    trace.signals.push(inch);
+    let result = by(&[trace]);
+    for (parameter, truth, share) in [(Parameter::Inertia, 0.0085, 0.01), (Parameter::SetpointDelay, 1.2, 1e-3)] {
+        let estimate = result.estimate(parameter).unwrap_or_else(|| panic!("{:?}", result.refusals));
+        assert!((estimate.value / truth - 1.0).abs() < share, "{estimate:?}, truth {truth}");
+    }
+    let said = |word: &str| result.verdicts.iter().any(|verdict| verdict.contains(word));
+    assert!(said("no samples for 0.701 s from 1.199 s on") && said("X.position_setpoint_in"), "{:?}", result.verdicts);
+}
+
+#[test]
+fn what_a_trace_has_instead_of_the_axis_is_named() {
+    let machine = machine("spinner_mvc850", &[]);
+    let x = machine.axis_by_name("X").unwrap();
+    let mut other = named("other", &legs(), &["position_setpoint", "current_mean"]);
+    for signal in &mut other.signals {
+        signal.original = signal.original.replace("X.", "Q.");
+        signal.name = Some(signal.original.clone());
+    }
+    let options = IdentifyOptions { axes: vec![x], linear_only: true };
+    let asked = |trace| identify(&[trace], &machine, &options, &mut |_| {}).expect("asked for").remove(0);
+    refused(&asked(other), Parameter::Inertia, "there are Q.position_setpoint_mm, Q.current_mean_a");
+    // A current alone is a signal of the axis: what is missing is the position.
+    refused(
+        &asked(named("current", &legs(), &["current_mean"])),
+        Parameter::Inertia,
+        "no trace has position and torque",
+    );
+    let mut cut = named("cut", &legs(), &["position_measured", "current_mean"]);
+    for signal in &mut cut.signals {
+        signal.values.truncate(1);
+        signal.times = sollwert::trace::TimeGrid::Uniform { start_ns: 0.0, step_ns: 1e6, count: 1 };
+    }
+    refused(&asked(cut), Parameter::Inertia, "less than two samples");
+}
+
 /// A trace of X of the Spinner under a name.
 fn named(name: &str, legs: &[(f64, f64, f64)], stems: &[&str]) -> sollwert::trace::Trace {
     let machine = machine("spinner_mvc850", &[]);

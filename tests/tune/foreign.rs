@@ -154,3 +154,64 @@ fn two_axes_of_another_plant_are_tuned_together_from_their_traces() {
         assert!((foreseen / done - 1.0).abs() < 0.5, "{objective:?}: {foreseen} mm foreseen, {done} mm done");
     }
 }
+
+/// Moves from rest to rest with the acceleration of a raised cosine: way in mm, time in s of each.
+fn moves(legs: &[(f64, f64)]) -> Vec<f64> {
+    let mut x_mm = vec![0.0; 30];
+    for (way_mm, time_s) in legs {
+        let start_mm = x_mm[x_mm.len() - 1];
+        let steps = (time_s / 1e-3) as usize;
+        // s - sin(2 pi s)/(2 pi): speed is zero at both ends, the acceleration too.
+        let share = |k: usize| k as f64 / steps as f64;
+        let at = |s: f64| start_mm + way_mm * (s - (std::f64::consts::TAU * s).sin() / std::f64::consts::TAU);
+        x_mm.extend((1..=steps).map(|k| (at(share(k)) * 1e6).round() * 1e-6));
+        x_mm.extend(std::iter::repeat_n(start_mm + way_mm, 20));
+    }
+    x_mm
+}
+
+/// Ten plants drawn around X, each measured with gains of its own, tuned from that trace, and driven on a motion that was not measured.
+#[test]
+fn many_other_plants_get_better_on_a_motion_that_was_not_measured() {
+    let seen_mm = moves(&[(30.0, 0.35), (-12.0, 0.3), (4.0, 0.15)]);
+    let unseen_mm = moves(&[(-18.0, 0.3), (25.0, 0.4)]);
+    let mut ratios = Vec::new();
+    for seed in 0..10 {
+        let mut random = Random::new(900 + seed);
+        let mut between = |low: f64, high: f64| random.between(low, high);
+        let plant = [
+            between(0.0045, 0.0075),
+            between(0.0015, 0.0045),
+            between(900.0, 3000.0),
+            between(0.2, 0.4),
+            between(0.0, 0.0015),
+            between(0.5, 1.1),
+            between(0.008, 0.016),
+            between(0.0, 0.5),
+            between(2.0, 10.0),
+        ];
+        let before = [between(0.96, 1.02), between(0.0, 0.5), between(0.4, 2.0)];
+        let foreign = Foreign { plant, ..X };
+        let key = ["velocity_feedforward", "torque_feedforward", "setpoint_delay_ms"];
+        let sets: Vec<String> =
+            key.iter().zip(before).map(|(key, value)| format!("axes.X.drive.{key}={value:.6}")).collect();
+        let loaded = machine(&sets.iter().map(String::as_str).collect::<Vec<_>>());
+        let trace = Trace {
+            name: "measured.csv".to_owned(),
+            signals: vec![
+                signal("X.position_setpoint_mm", seen_mm.clone(), 1e-3),
+                signal("X.control_deviation_mm", foreign.run(&seen_mm, before).0, 1e-3),
+            ],
+            ..Trace::default()
+        };
+        let course = course_of_trace(&trace, &loaded.machine, false).unwrap();
+        let found = tuned(&loaded, vec![course], &TuneOptions::default());
+        let gains = [Gain::Velocity, Gain::Torque, Gain::Delay].map(|kind| gain(&found, "X", kind));
+        let [old, new] = [before, gains].map(|gains| rms(&foreign.run(&unseen_mm, gains).0));
+        println!("{seed}: {before:?} {old:.5} mm, {gains:?} {new:.5} mm");
+        assert!(new <= old, "plant {seed}, {plant:?}: {new} mm with {gains:?}, {old} mm with {before:?}");
+        ratios.push(new / old);
+    }
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios[ratios.len() / 2] < 0.5, "{ratios:?}");
+}
