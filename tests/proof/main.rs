@@ -203,8 +203,8 @@ fn seven_phase_transformed() {
     prove_transformed(Law::SevenPhase);
 }
 
-/// Every limit holds. Reversed, or with a block in two, about one program in 500 to 2,000 takes another time by more than it should: none of
-/// the 300, but some of the nightly run.
+/// Every limit holds. Reversed, or with a block in two, few programs take another time by more than they should: none of the 300, one of 4,000
+/// others (130783); in one of those an axis was 0.05 % too fast (120624). Both are open.
 #[test]
 fn continuous() {
     prove(Law::Continuous);
@@ -217,7 +217,8 @@ const BROKE_ONCE: [u64; 16] =
     [3632, 6477, 5355, 6252, 10823, 11939, 12164, 15105, 10576, 12289, 20241, 23951, 27598, 49184, 49190, 62639];
 
 /// And those that took longer one way than the other, or stopped where no plan was found.
-const SLOW_ONCE: [u64; 11] = [10410, 11197, 11349, 11524, 13347, 23497, 25930, 32940, 45215, 102055, 102948];
+const SLOW_ONCE: [u64; 14] =
+    [10410, 11197, 11349, 11524, 13347, 22929, 23497, 25930, 32940, 45215, 102055, 102948, 120106, 120115];
 
 #[test]
 fn programs_that_were_wrong_once() {
