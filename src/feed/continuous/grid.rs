@@ -144,7 +144,7 @@ impl Grid {
 
 /// Highest constant speed at a place: feed and axis velocities, and the bend.
 pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &Derivatives) -> f64 {
-    let mut speed_lu_s = cap(rules, path, &[state]).velocity_lu_s;
+    let mut speed_lu_s = cap(rules, path, &[state], 0.0).velocity_lu_s;
     for (axis, limits) in AxisId::first(rules.axes.len()).zip(&rules.axes) {
         speed_lu_s = speed_lu_s.min((limits.acceleration_max_lu_s2 / state.second[axis].abs()).sqrt());
         if rules.jerk_limited {
@@ -201,7 +201,7 @@ impl<'a> Cutter<'a> {
             straight,
             bounds: Arc::new(Bounds::new(rules, blend)),
             tangent: Tangent { step_s: tangent.step_s.min(step_max_s), ..tangent },
-            top_lu_s: cap(rules, path, &[&start]).velocity_lu_s,
+            top_lu_s: cap(rules, path, &[&start], 0.0).velocity_lu_s,
             intervals: Vec::new(),
         }
     }
@@ -359,7 +359,7 @@ impl<'a> Cutter<'a> {
     /// The middle is what is between its neighbours.
     fn smooth(&self, from: &Derivatives, middle: &Derivatives, to: &Derivatives) -> bool {
         self.straight.is_some()
-            || self.bounds.smooth(cap(self.rules, self.path, &[middle]).velocity_lu_s, [from, middle, to])
+            || self.bounds.smooth(cap(self.rules, self.path, &[middle], 0.0).velocity_lu_s, [from, middle, to])
     }
 
     /// Takes out the axes whose demands are next to nothing all along.

@@ -100,7 +100,7 @@ impl Interval {
         Self {
             start_lu: range_lu[0],
             end_lu: range_lu[1],
-            cap: cap(rules, path, &[&states[0], &states[1], &states[2]]),
+            cap: cap(rules, path, &[&states[0], &states[1], &states[2]], range_lu[1] - range_lu[0]),
             states,
             reserve_ratio: if straight { LINE_RESERVE_RATIO } else { CURVE_RESERVE_RATIO },
             tightened: false,
@@ -142,7 +142,7 @@ impl Interval {
     pub fn part_by_itself(&self, rules: &AxisRules, path: &JointPath, start_lu: f64, end_lu: f64) -> Self {
         let part = self.part(path, start_lu, end_lu);
         Self {
-            cap: cap(rules, path, &[&part.states[0], &part.states[1], &part.states[2]]),
+            cap: cap(rules, path, &[&part.states[0], &part.states[1], &part.states[2]], part.length_lu()),
             reserve_ratio: self.base_reserve_ratio(),
             ..part
         }
@@ -331,19 +331,39 @@ impl Bounds {
     }
 }
 
-/// Feed and axis velocities, all along what lies between the places.
-pub(super) fn cap(rules: &AxisRules, path: &JointPath, states: &[&Derivatives]) -> SpeedCap {
+/// Feed and axis velocities, all along what lies between the places, `length_lu` from the first to the last of three.
+pub(super) fn cap(rules: &AxisRules, path: &JointPath, states: &[&Derivatives], length_lu: f64) -> SpeedCap {
     let share = |axis: AxisId| {
         let most = states.iter().fold(0.0_f64, |most, state| most.max(state.first[axis].abs()));
         let [from, middle, to] = states else { return most };
-        // Between the three places by the parabola through them, and by as much more as the third derivative may add.
-        let [left, middle, right] = [from, middle, to].map(|state| state.first[axis]);
-        let (slope, bend) = (0.5 * (right - left), left - 2.0 * middle + right);
-        let most = if slope.abs() < bend.abs() { most.max((middle - 0.5 * slope * slope / bend).abs()) } else { most };
+        // Between the three places by the parabola through them and by the cubics of each half, whose slopes are known, and by as much more as the
+        // third derivative may add.
+        let [left, centre, right] = [from, middle, to].map(|state| state.first[axis]);
+        let (slope, bend) = (0.5 * (right - left), left - 2.0 * centre + right);
+        let most = if slope.abs() < bend.abs() { most.max((centre - 0.5 * slope * slope / bend).abs()) } else { most };
+        let half = |from: &Derivatives, to: &Derivatives| {
+            let slopes = [from, to].map(|state| 0.5 * length_lu * state.second[axis]);
+            most_of_cubic([from.first[axis], to.first[axis]], slopes)
+        };
+        let most = most.max(half(from, middle)).max(half(middle, to));
         most + VELOCITY_RESERVE_RATIO * (right - left).abs().max(bend.abs())
     };
     match path.contour.curve() {
         Some(curve) => rules.driven(rules.feed_cap(&path.contour.feed, curve), share),
         None => STOP,
     }
+}
+
+/// Greatest amount on \[0, 1\] of the cubic with these values and slopes at its ends.
+fn most_of_cubic([start, end]: [f64; 2], [from, to]: [f64; 2]) -> f64 {
+    let square = 3.0 * (end - start) - 2.0 * from - to;
+    let cube = 2.0 * (start - end) + from + to;
+    // 3 cube x² + 2 square x + from = 0, without a difference of equals.
+    let root = (square * square - 3.0 * cube * from).max(0.0).sqrt();
+    let sum = -(square + root.copysign(square));
+    let value = |x: f64| start + x * (from + x * (square + x * cube));
+    [sum / (3.0 * cube), from / sum]
+        .into_iter()
+        .filter(|x| (0.0..=1.0).contains(x))
+        .fold(start.abs().max(end.abs()), |most, x| most.max(value(x).abs()))
 }

@@ -122,7 +122,7 @@ impl Continuous {
 fn slower(interval: &Interval, piece: &Piece<'_>) -> f64 {
     let rules = piece.flow.rules.throughout(piece.path);
     let wider = |state| {
-        let place = cap(rules, piece.path, &[state]).velocity_lu_s;
+        let place = cap(rules, piece.path, &[state], 0.0).velocity_lu_s;
         ((place / interval.cap.velocity_lu_s).powi(2) - 1.0).clamp(0.0, WIDER_MAX_RATIO)
     };
     let [from, middle, to] = &interval.states;
