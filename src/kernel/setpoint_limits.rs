@@ -1,8 +1,7 @@
 //! Whether the set-points that `follow` is given keep to the limits of their axes.
 //!
 //! In: every set-point of an axis with its backward differences. Out: bits of `monitoring` for the row, and one warning an axis: what was exceeded, by how
-//! much, how often, from when on. Stops
-//! nothing: a table may be anything, and the drives show what they make of it. Does not know paths.
+//! much, how often, from when on. Stops nothing: a table may be anything, and the drives show what they make of it. Does not know paths.
 
 use crate::base::units::deg_from_rad;
 use crate::base::{AxisId, AxisKind, Diagnostic, PerAxis};

@@ -46,8 +46,8 @@ const REACH_RATIO: f64 = 8.0;
 const REACH_INTERVALS: f64 = 24.0;
 
 /// A path that rests within so many intervals is planned to its end at once. The problem is not convex: what is the fastest in a blend hangs on what is
-/// planned before and after it, and so a little on where plans end. One plan does not know blocks, and the reversed path has the mirror image of it. It is also
-/// the cheapest: no part of the path is planned twice.
+/// planned before and after it, and so a little on where plans end, which is another place on the reversed path and on one with a block in two. No part of
+/// the path is planned twice, so that it costs no more. The number bounds memory (about 60 MB) and is chosen, not derived.
 const WHOLE_INTERVALS_MAX: f64 = 2000.0;
 
 /// A grid for an end about which nothing was known yet serves an end that is slower, down to this share.
