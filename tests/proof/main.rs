@@ -16,6 +16,7 @@ mod contour;
 mod faults;
 #[cfg(feature = "optimal")]
 mod optimum;
+mod overridden;
 mod program;
 #[path = "../random/mod.rs"]
 mod random;
@@ -77,6 +78,11 @@ fn judged(settings: &Settings, program: &Program, random: Option<Random>) -> Vec
         findings.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
         findings
     };
+    caught(judge)
+}
+
+/// A panic is a finding.
+fn caught(judge: impl FnOnce() -> Vec<Finding>) -> Vec<Finding> {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(judge)).unwrap_or_else(|panic| {
         let text =
             panic.downcast_ref::<String>().cloned().or(panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
@@ -193,6 +199,26 @@ fn prove_transformed(law: Law) {
     Proof { name: &format!("{}, transformed", law.word()), judged: &judged, print: &print, share: 10 }.run();
 }
 
+/// A third as many: the same programs under a feed override that changes.
+fn prove_overridden() {
+    let judged = |seed| {
+        let (settings, program, _) = case(seed, Law::Continuous);
+        caught(|| overridden::judged(&settings, &program, &overridden::schedule(seed)))
+    };
+    let print = |seed, kind: Kind| {
+        let (settings, program, _) = case(seed, Law::Continuous);
+        let schedule = overridden::schedule(seed);
+        let failing = |program: &Program| {
+            caught(|| overridden::judged(&settings, program, &schedule))
+                .into_iter()
+                .find(|finding| finding.kind == kind)
+        };
+        println!("--override {schedule}");
+        shrink::print(seed, &settings, &program, &failing);
+    };
+    Proof { name: "continuous, overridden", judged: &judged, print: &print, share: 3 }.run();
+}
+
 #[test]
 fn seven_phase() {
     prove(Law::SevenPhase);
@@ -233,6 +259,11 @@ fn programs_that_were_wrong_once() {
             left.len()
         );
     }
+}
+
+#[test]
+fn continuous_overridden() {
+    prove_overridden();
 }
 
 #[test]

@@ -5,10 +5,11 @@
 //! here knows how speeds were chosen.
 
 use sollwert::base::PerAxis;
+use sollwert::feed::OverrideSchedule;
 use sollwert::geometry::Curve;
 use sollwert::interpolator::Setpoint;
 use sollwert::interpreter::{Feed, Interpreter, Modes, MoveKind};
-use sollwert::kernel::{Kernel, RunSummary, Status};
+use sollwert::kernel::{Kernel, Preparation, RunSummary, Status};
 use sollwert::kinematics::{JointPath, Kinematics};
 use sollwert::machine::{AccelerationMode, Machine};
 use sollwert::program::ProgramSource;
@@ -113,7 +114,13 @@ impl Row {
 impl Run {
     /// An alarm is an `Err` with its text.
     pub fn new(machine: &Arc<Machine>, text: &str) -> Result<Self, String> {
-        let mut kernel = Kernel::new(machine.clone(), source(text), false);
+        Self::overridden(machine, text, &OverrideSchedule::none())
+    }
+
+    /// The same with changes of the feed override.
+    pub fn overridden(machine: &Arc<Machine>, text: &str, overrides: &OverrideSchedule) -> Result<Self, String> {
+        let preparation = Preparation::new(source(text), machine).with_overrides(overrides);
+        let mut kernel = Kernel::with_source(machine.clone(), preparation, false);
         let mut rows = Vec::new();
         while kernel.cycle().map_err(|error| format!("{error:?}"))? == Status::Running {
             let Some(setpoint) = &kernel.output().setpoint else { return Err("a cycle without set-point".into()) };

@@ -2,7 +2,8 @@
 
 use crate::program::Program;
 use crate::settings::Settings;
-use crate::verdict::Finding;
+use crate::times;
+use crate::verdict::{Finding, Kind};
 
 /// Runs that the search may take.
 const RUNS_MAX: usize = 600;
@@ -42,4 +43,9 @@ pub fn print(seed: u64, settings: &Settings, program: &Program, failing: Failing
     let Finding { kind, ratio, text } = finding;
     println!("\nseed {seed}, {kind:?}, {ratio:.4} times what is allowed: {text}");
     println!("{}---\n{}---", program.text(settings), settings.text());
+    if kind == Kind::Reversed
+        && let Some([.., back]) = times::texts(settings, &program)
+    {
+        println!("reversed:\n{back}---");
+    }
 }

@@ -27,15 +27,9 @@ pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
     if settings.law == Law::SevenPhase {
         return None;
     }
-    let back = program.reversed()?;
     let settings = Settings { look_ahead_blocks: WINDOW_BLOCKS, ..settings.clone() };
     let machine = Arc::new(settings.machine());
-    let (there, end) = program.text_from(&settings, [0.0; 5], "");
-    let words: String =
-        settings.axes.iter().enumerate().map(|(i, axis)| format!(" {}{:.6}", axis.name, end[i])).collect();
-    let opening = format!("G60\nG0{words}\n");
-    let approach = format!("G17 G90 G71 G94 G1\n{opening}M30\n");
-    let (back, _) = back.text_from(&settings, end, &opening);
+    let [there, approach, back] = texts(&settings, program)?;
     let time = |text: &str| Run::new(&machine, text).ok().map(|run| (run.cycle_time_s(), run));
     let ((there_s, first), (back_s, second), (approach_s, third)) = (time(&there)?, time(&back)?, time(&approach)?);
     // Rounding of points may make a corner, or take one away: at a hair of a line between an arc and its tangent, for one.
@@ -54,6 +48,18 @@ pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
     let ratio = (there_s - back_s).abs() / allowed;
     let text = format!("{there_s:.6} s, reversed {back_s:.6} s ({:+.3} %)", 100.0 * (back_s / there_s - 1.0));
     (ratio > 1.0).then_some(Finding { kind: Kind::Reversed, ratio, text })
+}
+
+/// The program, the way to its end, and that with the reversed program after it. `None`: it has no reverse.
+pub fn texts(settings: &Settings, program: &Program) -> Option<[String; 3]> {
+    let back = program.reversed()?;
+    let (there, end) = program.text_from(settings, [0.0; 5], "");
+    let words: String =
+        settings.axes.iter().enumerate().map(|(i, axis)| format!(" {}{:.6}", axis.name, end[i])).collect();
+    let opening = format!("G60\nG0{words}\n");
+    let approach = format!("G17 G90 G71 G94 G1\n{opening}M30\n");
+    let (back, _) = back.text_from(settings, end, &opening);
+    Some([there, approach, back])
 }
 
 /// A line in two is the same motion. `None`: it is, or there is no line to split, or the split changes the path.

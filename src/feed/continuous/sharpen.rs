@@ -29,9 +29,12 @@ const PARTS_MAX: usize = 4;
 const SHORTEST_S: f64 = 4e-5;
 
 /// Where so much of the time hangs on the limits of one interval, if they were wider by 1, it is put in parts once whatever first order says: its profile may
-/// be the best of its kind, and another kind faster that only shorter intervals can follow. Counted is this share of it.
+/// be the best of its kind, and another kind faster that only shorter intervals can follow. Counted is this share of it. Again it is put in parts where what
+/// hangs on it is this many times its own time: a place through which all before and after it must pass. Where one limit holds a whole path it is
+/// between a third (jerk) and a half (acceleration) of it.
 const HEAVY_PRICE: f64 = 0.003;
 const HEAVY_SHARE: f64 = 0.1;
+const NARROW_RATIO: f64 = 5.0;
 
 /// A limit that another part of the interval would not need counts as so much wider there at most.
 const WIDER_MAX_RATIO: f64 = 1.0;
@@ -89,6 +92,7 @@ impl Continuous {
         let range = chain.control_range(start);
         let near = range.end.min(self.planning.near(chain, profile));
         let mut costs = vec![0.0; chain.intervals.len()];
+        let whole_s = profile.time_s(chain);
         for index in range.start..near {
             let interval = &chain.intervals[index];
             let v = profile.points[index].speed_squared_lu2_s2.sqrt();
@@ -104,7 +108,8 @@ impl Continuous {
                 slower(interval, &pieces[owners[index]])
             };
             let mut cost = prices.unused + prices.limits * tighter + prices.cap * slower;
-            if first && prices.limits > HEAVY_PRICE {
+            let is_narrow = || prices.limits > NARROW_RATIO * profile.interval_s(chain, index) / whole_s;
+            if prices.limits > HEAVY_PRICE && (first || is_narrow()) {
                 cost = cost.max(HEAVY_SHARE * prices.limits);
             }
             costs[index] = if cost.is_finite() { cost } else { 0.0 };
@@ -147,8 +152,12 @@ fn parts(costs: &[f64], left_ratio: f64) -> Vec<usize> {
 impl Profile {
     /// With b'' as it is, about.
     fn time_s(&self, chain: &Chain) -> f64 {
+        (0..chain.intervals.len()).map(|index| self.interval_s(chain, index)).sum()
+    }
+
+    fn interval_s(&self, chain: &Chain, index: usize) -> f64 {
         let v = |index: usize| self.points[index].speed_squared_lu2_s2.max(0.0).sqrt();
-        chain.intervals.iter().enumerate().map(|(i, interval)| 2.0 * interval.length_lu() / (v(i) + v(i + 1))).sum()
+        2.0 * chain.intervals[index].length_lu() / (v(index) + v(index + 1))
     }
 
     /// The states at the borders when intervals are put in parts.
