@@ -34,6 +34,10 @@ const SLOW_PLACES_SHARE: [f64; 3] = [0.3, 0.5, 0.7];
 const CUTS_MAX: u32 = 40;
 const INTERVALS_MAX: usize = 20_000;
 
+/// Within an interval the acceleration and jerk that the axes allow along the tangent change by this factor at most: where a slow axis takes over
+/// from a fast one the profile does so, too.
+const STEADY_MAX_RATIO: f64 = 2.0;
+
 /// The interval at a rest is at most this share of its piece.
 const REST_SHARE: f64 = 0.15;
 
@@ -273,7 +277,10 @@ impl<'a> Cutter<'a> {
             let enough = cuts >= CUTS_MAX || self.intervals.len() + waiting.len() >= INTERVALS_MAX;
             if rest
                 || enough
-                || (cuts >= cuts_min && self.quick(from.0, to.0, &middle) && self.smooth(&from.1, &middle, &to.1))
+                || (cuts >= cuts_min
+                    && self.quick(from.0, to.0, &middle)
+                    && self.steady(&from.1, &to.1)
+                    && self.smooth(&from.1, &middle, &to.1))
             {
                 self.push(from, middle, to);
                 from = to;
@@ -345,6 +352,18 @@ impl<'a> Cutter<'a> {
             (speed_lu_s, step_s, away_s) = (speed_lu_s.max(settling_lu_s), SETTLING_STEP_RATIO * step_s, 0.0);
         }
         end_lu - start_lu <= speed_lu_s * step_s.max(away_s)
+    }
+
+    /// What the axes allow along the tangent is about the same at both ends of an interval.
+    fn steady(&self, from: &Derivatives, to: &Derivatives) -> bool {
+        if self.straight.is_some() {
+            return true;
+        }
+        let demand = |state: &Derivatives| {
+            self.rules.largest(|axis, limits| state.first[axis].abs() / limits.jerk_max_lu_s3).demand_ratio
+        };
+        let (from, to) = (demand(from), demand(to));
+        from.max(to) <= STEADY_MAX_RATIO * from.min(to)
     }
 
     /// About the speed that is reached at a distance from an end.
