@@ -31,8 +31,9 @@ const NEAR_ENOUGH_RATIO: f64 = 0.9;
 /// Kept below the tolerance for what samples may miss between them.
 const SAMPLE_RESERVE_RATIO: f64 = 0.99;
 
-/// Stretches shorter than this share of T are none.
-const STRETCH_MIN_RATIO: f64 = 1e-9;
+/// Axes whose T_j differ by less than this share leave their lines at one place: a stretch between, as short as rounding makes it, is no use to anyone
+/// and has a jerk of its own.
+const STRETCH_MIN_RATIO: f64 = 1e-3;
 
 /// Deviation in the middle of a blend between lines, over T |V - U|.
 const MIDDLE_RATIO: f64 = 3.0 / 16.0;
@@ -198,9 +199,11 @@ pub(super) fn per_axis(
     if stuck || !(t_lu > 0.0 && t_lu.is_finite()) {
         return None;
     }
+    let reach = joined(reach, STRETCH_MIN_RATIO * t_lu);
+    let t_lu = reach.as_slice().iter().fold(0.0_f64, |most, t_lu| most.max(*t_lu));
     let mut places: Vec<f64> = reach.as_slice().iter().flat_map(|t_lu| [-*t_lu, *t_lu]).collect();
     places.sort_by(f64::total_cmp);
-    places.dedup_by(|a, b| (*a - *b).abs() <= STRETCH_MIN_RATIO * t_lu);
+    places.dedup();
     let own = PerAxis::from_fn(|axis| {
         let t_lu = reach[axis];
         let at = |s_lu: f64, slope: f64| [corner[axis] + s_lu * slope, slope, 0.0];
@@ -226,6 +229,19 @@ pub(super) fn per_axis(
     let deviation = PerAxis::from_fn(|axis| MIDDLE_RATIO * reach[axis] * turn[axis]);
     let curve = chained(pieces, ends(t_lu), linear)?;
     Some(Transition { curve, length_lu: t_lu, deviation_mm: deviation.masked(linear).norm() })
+}
+
+/// Every T_j that is longer than another one by no more than `near_lu` as long as that one: no axis deviates by more than before.
+fn joined(reach: PerAxis<f64>, near_lu: f64) -> PerAxis<f64> {
+    let mut sorted: Vec<f64> = reach.as_slice().iter().copied().filter(|t_lu| *t_lu > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    let mut firsts: Vec<f64> = Vec::new();
+    for t_lu in sorted {
+        if firsts.last().is_none_or(|first| t_lu - first > near_lu) {
+            firsts.push(t_lu);
+        }
+    }
+    reach.map(|t_lu| firsts.iter().rev().copied().find(|first| *first <= t_lu).unwrap_or(t_lu))
 }
 
 fn chained(pieces: Vec<PolynomialPiece>, [start, end]: [PartPoint; 2], linear: &PerAxis<bool>) -> Option<Curve> {

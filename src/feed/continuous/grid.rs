@@ -53,6 +53,9 @@ const SETTLED_SHARE: f64 = 0.3;
 /// There an interval takes this share of the usual time.
 const SETTLING_STEP_RATIO: f64 = 0.5;
 
+/// Knots nearer to each other than this share of the piece are one.
+const KNOT_MIN_SHARE: f64 = 1e-7;
+
 /// Beside a knot of a spline its derivatives are taken this share of the range inside.
 const BESIDE_RATIO: f64 = 1e-9;
 
@@ -136,6 +139,8 @@ struct Cutter<'a> {
     bounds: Arc<Bounds>,
     tangent: Tangent,
     top_lu_s: f64,
+    /// Knots too near to another border for an interval of their own.
+    passed_lu: Vec<f64>,
     intervals: Vec<Interval>,
 }
 
@@ -206,6 +211,7 @@ impl<'a> Cutter<'a> {
             bounds: Arc::new(Bounds::new(rules, blend)),
             tangent: Tangent { step_s: tangent.step_s.min(step_max_s), ..tangent },
             top_lu_s: cap(rules, path, &[&start], 0.0).velocity_lu_s,
+            passed_lu: Vec::new(),
             intervals: Vec::new(),
         }
     }
@@ -225,7 +231,16 @@ impl<'a> Cutter<'a> {
             _ if self.path.is_contour() => Vec::new(),
             _ => self.path.nodes_lu(),
         };
-        borders.extend(knots.into_iter().filter(|s_lu| *s_lu > inside[0] && *s_lu < inside[1]));
+        // Knots that are one but for rounding make no interval: nothing happens between them, and a number divided by their distance is none.
+        let knot_min_lu = KNOT_MIN_SHARE * self.path.length_lu();
+        for s_lu in knots {
+            let before_lu = borders[borders.len() - 1];
+            if s_lu > before_lu + knot_min_lu && s_lu < inside[1] - knot_min_lu {
+                borders.push(s_lu);
+            } else if s_lu > from_lu && s_lu < to_lu {
+                self.passed_lu.push(s_lu);
+            }
+        }
         if rests[1] {
             borders.push(to_lu - stop_lu);
         }
@@ -263,8 +278,17 @@ impl<'a> Cutter<'a> {
 
     fn cut_range(&mut self, start_lu: f64, end_lu: f64) {
         let inside = BESIDE_RATIO * (end_lu - start_lu);
-        let at_start = self.look(if start_lu > 0.0 { start_lu + inside } else { 0.0 });
-        let at_end = self.look(if end_lu < self.path.length_lu() { end_lu - inside } else { end_lu });
+        let near = |s_lu: f64, place_lu: f64| (s_lu - place_lu).abs() <= KNOT_MIN_SHARE * self.path.length_lu();
+        let last = self.passed_lu.iter().copied().filter(|s_lu| near(*s_lu, start_lu)).reduce(f64::max);
+        let first = self.passed_lu.iter().copied().filter(|s_lu| near(*s_lu, end_lu)).reduce(f64::min);
+        let at_start = match last.map_or(start_lu, |s_lu| s_lu.max(start_lu)) {
+            start_lu if start_lu > 0.0 => self.look(start_lu + inside),
+            _ => self.look(0.0),
+        };
+        let at_end = match first.map_or(end_lu, |s_lu| s_lu.min(end_lu)) {
+            end_lu if end_lu < self.path.length_lu() => self.look(end_lu - inside),
+            _ => self.look(end_lu),
+        };
         let Stretch { from_lu, to_lu, ends, .. } = self.stretch;
         let rest = (ends[0] == End::Rest && start_lu == from_lu)
             || (ends[1] == End::Rest && end_lu == to_lu && start_lu > from_lu);
