@@ -207,12 +207,13 @@ fn prove_overridden() {
     };
     let print = |seed, kind: Kind| {
         let (settings, program, _) = case(seed, Law::Continuous);
-        let schedule = overridden::schedule(seed);
-        let failing = |program: &Program| {
-            caught(|| overridden::judged(&settings, program, &schedule))
-                .into_iter()
-                .find(|finding| finding.kind == kind)
+        let finding = |program: &Program, schedule: &str| {
+            let findings = caught(|| overridden::judged(&settings, program, schedule));
+            findings.into_iter().find(|finding| finding.kind == kind)
         };
+        let schedule =
+            overridden::fewest(&overridden::schedule(seed), |schedule| finding(&program, schedule).is_some());
+        let failing = |program: &Program| finding(program, &schedule);
         println!("--override {schedule}");
         shrink::print(seed, &settings, &program, &failing);
     };

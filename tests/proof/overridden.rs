@@ -60,3 +60,19 @@ pub fn judged(settings: &Settings, program: &Program, schedule: &str) -> Vec<Fin
     findings.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     findings
 }
+
+/// Leaves out changes while the program still fails.
+pub fn fewest(schedule: &str, fails: impl Fn(&str) -> bool) -> String {
+    let mut changes: Vec<&str> = schedule.split(',').collect();
+    let mut index = 0;
+    while index < changes.len() {
+        let mut fewer = changes.clone();
+        fewer.remove(index);
+        if !fewer.is_empty() && fails(&fewer.join(",")) {
+            changes = fewer;
+        } else {
+            index += 1;
+        }
+    }
+    changes.join(",")
+}

@@ -413,7 +413,10 @@ impl Continuous {
             let again = !is_last
                 && index > 0
                 && grid.open_lu_s.is_some_and(|v| group::speed_after_lu_s(pieces, index) < SLOWER_RATIO * v);
-            if !again {
+            // It has come to rest inside since, or something changed there.
+            let elsewhere =
+                index == 0 && grid.intervals.first().is_some_and(|first| first.start_lu != self.regime.from_lu);
+            if !again && !elsewhere {
                 return;
             }
         }
