@@ -53,6 +53,8 @@ pub(super) struct AxisRules {
     pub jerk_limited: bool,
     /// OVR and OVRRAP.
     pub override_ratio: f64,
+    /// So many times the feed under it the path may still be, because the override was higher a moment ago.
+    pub leaving_ratio: f64,
     /// Neither OVR nor the switch acts: G63.
     pub override_fixed: bool,
     /// OVRRAP; at most 1, because the axes cannot do more.
@@ -135,18 +137,35 @@ impl AxisRules {
         rules
     }
 
-    /// The same with this override on top of OVR; both together do no more than the control allows.
-    pub(super) fn overridden(&self, override_ratio: f64) -> Self {
+    /// The same with this override on top of OVR; both together do no more than the control allows. Where it has just been changed the path may still
+    /// be as fast as under `fastest_ratio`.
+    pub(super) fn overridden(&self, override_ratio: f64, fastest_ratio: f64) -> Self {
         let mut rules = self.clone();
         if rules.override_fixed {
             return rules;
         }
-        rules.override_ratio = (rules.override_ratio * override_ratio).min(OVERRIDE_MAX_RATIO);
+        let programmed_ratio = rules.override_ratio;
+        let [ratio, fastest] =
+            [override_ratio, fastest_ratio].map(|ratio| (programmed_ratio * ratio).min(OVERRIDE_MAX_RATIO));
+        (rules.override_ratio, rules.leaving_ratio) = (ratio, (fastest / ratio).max(1.0));
         if let Some(drive) = &mut rules.drive {
-            drive.slow = drive.slow.overridden(override_ratio);
-            drive.weak = drive.weak.overridden(override_ratio);
+            drive.slow = drive.slow.overridden(override_ratio, fastest_ratio);
+            drive.weak = drive.weak.overridden(override_ratio, fastest_ratio);
         }
         rules
+    }
+
+    /// F of a piece under an override on top of OVR; infinite for a rapid.
+    pub(super) fn feed_under_lu_s(&self, path: &JointPath, override_ratio: f64) -> f64 {
+        let Some(curve) = path.contour.curve() else { return f64::INFINITY };
+        let FeedCap::Programmed(cap) = self.feed_cap(&path.contour.feed, curve) else { return f64::INFINITY };
+        let ratio = if self.override_fixed { self.override_ratio } else { self.override_ratio * override_ratio };
+        cap.velocity_lu_s / self.override_ratio * ratio.min(OVERRIDE_MAX_RATIO)
+    }
+
+    /// What the axes may do depends on how fast they are.
+    pub(super) fn weakens(&self) -> bool {
+        self.drive.is_some()
     }
 
     fn with_axes(machine: &Machine, programmed: &ProgrammedLimits, axes: Vec<AxisLimits>) -> Self {
@@ -181,6 +200,7 @@ impl AxisRules {
             setpoint_period_s,
             jerk_limited: true,
             override_ratio: if programmed.override_acts { programmed.override_ratio } else { 1.0 },
+            leaving_ratio: 1.0,
             override_fixed: !programmed.override_acts,
             rapid_override_ratio: programmed.rapid_override_ratio.min(1.0),
             group,
@@ -203,11 +223,8 @@ impl AxisRules {
             between_ratio * states.iter().fold(0.0_f64, |most, state| most.max(state.first[axis].abs()))
         };
         let mut axes = AxisId::first(self.axes.len()).zip(&drive.slow.axes);
-        if axes.all(|(id, limits)| share(id) * cap.velocity_lu_s <= limits.velocity_max_lu_s) {
-            self
-        } else {
-            &drive.weak
-        }
+        let fastest_lu_s = cap.velocity_lu_s * self.leaving_ratio;
+        if axes.all(|(id, limits)| share(id) * fastest_lu_s <= limits.velocity_max_lu_s) { self } else { &drive.weak }
     }
 
     /// `None` where no axis has less acceleration at high speed.

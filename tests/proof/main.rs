@@ -230,8 +230,7 @@ fn seven_phase_transformed() {
     prove_transformed(Law::SevenPhase);
 }
 
-/// Every limit holds. Reversed, or with a block in two, few programs take another time by more than they should: none of the 300, one of 4,000
-/// others (130783).
+/// Every limit holds, and the reversed path and one with a block in two take the same time.
 #[test]
 fn continuous() {
     prove(Law::Continuous);
@@ -246,19 +245,28 @@ const BROKE_ONCE: [u64; 17] = [
 ];
 
 /// And those that took longer one way than the other, or stopped where no plan was found.
-const SLOW_ONCE: [u64; 14] =
-    [10410, 11197, 11349, 11524, 13347, 22929, 23497, 25930, 32940, 45215, 102055, 102948, 120106, 120115];
+const SLOW_ONCE: [u64; 18] = [
+    10410, 11197, 11349, 11524, 13347, 22929, 23497, 25930, 32940, 45215, 102055, 102948, 120106, 120115, 130783,
+    303945, 307600, 311482,
+];
+
+/// And those that broke a limit under a changing override: 0 % that brought the path to rest inside a rapid (7, 110), DRIVE where the speed came from a
+/// higher feed than the one in force (136, 193, 208, 277), a feed above F by what the solver was given for room (119, 178).
+const OVERRIDDEN_ONCE: [u64; 8] = [7, 110, 119, 136, 178, 193, 208, 277];
 
 #[test]
 fn programs_that_were_wrong_once() {
+    let none = |seed: u64, left: &[Finding]| {
+        let count = left.len();
+        assert!(count == 0, "seed {seed}: {count} findings, such as PROOF_FIRST={seed} PROOF_PROGRAMS=1 shows");
+    };
     for seed in BROKE_ONCE.into_iter().chain(SLOW_ONCE) {
         let (settings, program, random) = case(seed, Law::Continuous);
-        let left = judged(&settings, &program, Some(random));
-        assert!(
-            left.is_empty(),
-            "seed {seed}: {} findings, such as PROOF_FIRST={seed} PROOF_PROGRAMS=1 shows",
-            left.len()
-        );
+        none(seed, &judged(&settings, &program, Some(random)));
+    }
+    for seed in OVERRIDDEN_ONCE {
+        let (settings, program, _) = case(seed, Law::Continuous);
+        none(seed, &overridden::judged(&settings, &program, &overridden::schedule(seed)));
     }
 }
 

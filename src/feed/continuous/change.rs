@@ -121,7 +121,7 @@ impl Continuous {
         if rapids(pieces) == pieces.len() {
             // With 0 % too: the plan before ends at rest among them.
             if override_ratio > 0.0 {
-                self.regime.moving_ratio = override_ratio;
+                self.regime.move_to(override_ratio);
             }
             return Change::Nothing;
         }
@@ -159,7 +159,7 @@ impl Continuous {
         let regime = &mut self.regime;
         (regime.settling_lu, regime.point) = (0.0, None);
         if override_ratio > 0.0 {
-            regime.moving_ratio = override_ratio;
+            regime.begin_at(override_ratio);
         }
         let Some(front) = pieces.first_mut() else { return };
         if regime.from_lu > 0.0 {
@@ -172,7 +172,7 @@ impl Continuous {
 
     /// Another feed above 0.
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
-        let before = std::mem::replace(&mut self.regime.moving_ratio, override_ratio);
+        let before = self.regime.move_to(override_ratio);
         let Expected { way_lu: guess_lu, landing_lu } = self.expect(pieces, start, false);
         let count = self.reach(pieces, 0, start).usual;
         let layout = self.layout(pieces, count, 0, start);
@@ -197,7 +197,7 @@ impl Continuous {
         };
         let found = attempt(0.0, None).or_else(|| shortest(guess_lu, most_lu, attempt));
         let Some(Trial { layout, profile, way_lu }) = found else {
-            self.regime.moving_ratio = before;
+            [self.regime.moving_ratio, self.regime.fastest_ratio] = before;
             return false;
         };
         self.regime.settling_lu = way_lu;
@@ -360,6 +360,8 @@ impl Continuous {
             if left_lu < (1.0 - NEAR_END_SHARE) * length_lu {
                 layout.split(index, left_lu, pieces);
             }
+            let Piece { path, flow, .. } = &pieces[layout.owners[index]];
+            let highest_lu_s = flow.programmed.feed_under_lu_s(path, self.regime.fastest_ratio);
             let interval = &mut layout.chain.intervals[index];
             let end_lu = at_lu + interval.length_lu();
             let [Some(from), Some(middle), Some(to)] = [at_lu, 0.5 * (at_lu + end_lu), end_lu].map(|at| before.at(at))
@@ -368,7 +370,9 @@ impl Continuous {
             };
             // The control point of the parabola through the three as well.
             let b = from.max(to).max(2.0 * middle - 0.5 * (from + to));
-            interval.cap.velocity_lu_s = interval.cap.velocity_lu_s.max(LOOSE_RATIO * b.sqrt());
+            // Room for the solver, but not above any feed that has been in force.
+            let v = b.sqrt();
+            interval.cap.velocity_lu_s = interval.cap.velocity_lu_s.max((LOOSE_RATIO * v).min(highest_lu_s.max(v)));
             (at_lu, index) = (end_lu, index + 1);
         }
     }

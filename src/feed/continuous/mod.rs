@@ -64,6 +64,8 @@ pub(super) struct Flow {
     /// The same under the override that it was looked at with last.
     rules: Arc<AxisRules>,
     override_ratio: f64,
+    /// Of those that the path may still be as fast as under (`Regime`).
+    fastest_ratio: f64,
     blend: bool,
     /// About the highest speeds at its ends.
     ends_lu_s: [f64; 2],
@@ -133,7 +135,18 @@ impl Flow {
             Some(brief) => [brief.speed_lu_s; 2],
             None => grid::end_speeds_lu_s(&rules, path),
         };
-        Self { programmed: rules.clone(), rules, override_ratio: 1.0, blend, ends_lu_s, tangent, brief, grid: None }
+        let (override_ratio, fastest_ratio) = (1.0, 1.0);
+        Self {
+            programmed: rules.clone(),
+            rules,
+            override_ratio,
+            fastest_ratio,
+            blend,
+            ends_lu_s,
+            tangent,
+            brief,
+            grid: None,
+        }
     }
 
     /// Highest constant speeds at its ends; not positive or no number: nothing can move there.
@@ -145,7 +158,8 @@ impl Flow {
     fn follow(&mut self, rules: Arc<AxisRules>, path: &JointPath) {
         let ends = [path.at(0.0), path.at(path.length_lu())];
         let new = Self::new(rules, path, self.blend, ends.each_ref());
-        *self = Self { programmed: self.programmed.clone(), override_ratio: self.override_ratio, ..new };
+        let Self { override_ratio, fastest_ratio, .. } = *self;
+        *self = Self { programmed: self.programmed.clone(), override_ratio, fastest_ratio, ..new };
     }
 
     /// The way that a stop from its highest speed takes, about.

@@ -19,6 +19,8 @@ pub(super) struct Regime {
     pub override_ratio: f64,
     /// The last one above 0: feeds are planned with it.
     pub moving_ratio: f64,
+    /// The highest since the path last kept one: while it settles it may be as fast as under that.
+    pub fastest_ratio: f64,
     /// So far from where the front stands the speed may still be that of the plan before.
     pub settling_lu: f64,
     /// Where the front piece stands.
@@ -28,7 +30,7 @@ pub(super) struct Regime {
     /// What a change takes, about, while it is planned.
     pub transition: Option<Settling>,
     /// Rules under the override that were asked for last, with those that they come from.
-    overridden: Option<(Arc<AxisRules>, f64, Arc<AxisRules>)>,
+    overridden: Option<(Arc<AxisRules>, [f64; 2], Arc<AxisRules>)>,
 }
 
 impl Default for Regime {
@@ -36,6 +38,7 @@ impl Default for Regime {
         Self {
             override_ratio: 1.0,
             moving_ratio: 1.0,
+            fastest_ratio: 1.0,
             settling_lu: 0.0,
             from_lu: 0.0,
             point: None,
@@ -66,13 +69,29 @@ impl Regime {
         allowed
     }
 
+    /// Another override above 0 in force from now on; the feeds before it, to go back to them.
+    pub fn move_to(&mut self, override_ratio: f64) -> [f64; 2] {
+        let before = [self.moving_ratio, self.fastest_ratio];
+        let settled = self.settling_lu <= 0.0;
+        self.fastest_ratio = if settled { self.moving_ratio } else { self.fastest_ratio }.max(override_ratio);
+        self.moving_ratio = override_ratio;
+        before
+    }
+
+    /// The same from rest.
+    pub fn begin_at(&mut self, override_ratio: f64) {
+        (self.moving_ratio, self.fastest_ratio) = (override_ratio, override_ratio);
+    }
+
     /// Brings a piece under the override that feeds are planned with.
     pub fn look(&mut self, piece: &mut Piece<'_>) {
-        let override_ratio = self.moving_ratio;
-        if piece.flow.override_ratio == override_ratio {
+        let flow = &mut piece.flow;
+        let settles = self.settling_lu > 0.0 || self.transition.is_some();
+        let leaves = settles && flow.programmed.weakens() && flow.fastest_ratio < self.fastest_ratio;
+        if flow.override_ratio == self.moving_ratio && !leaves {
             return;
         }
-        piece.flow.override_ratio = override_ratio;
+        (flow.override_ratio, flow.fastest_ratio) = (self.moving_ratio, self.fastest_ratio);
         if !piece.is_rapid() {
             let rules = self.overridden(&piece.flow.programmed);
             piece.flow.follow(rules, piece.path);
@@ -80,17 +99,18 @@ impl Regime {
     }
 
     fn overridden(&mut self, programmed: &Arc<AxisRules>) -> Arc<AxisRules> {
-        if self.moving_ratio == 1.0 {
+        let key = [self.moving_ratio, self.fastest_ratio];
+        if key == [1.0; 2] {
             return programmed.clone();
         }
-        if let Some((from, ratio, rules)) = &self.overridden
+        if let Some((from, known, rules)) = &self.overridden
             && Arc::ptr_eq(from, programmed)
-            && *ratio == self.moving_ratio
+            && *known == key
         {
             return rules.clone();
         }
-        let rules = Arc::new(programmed.overridden(self.moving_ratio));
-        self.overridden = Some((programmed.clone(), self.moving_ratio, rules.clone()));
+        let rules = Arc::new(programmed.overridden(self.moving_ratio, self.fastest_ratio));
+        self.overridden = Some((programmed.clone(), key, rules.clone()));
         rules
     }
 
