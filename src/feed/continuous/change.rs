@@ -400,7 +400,8 @@ fn keeps_velocities(layout: &mut Layout, profile: &Profile, pieces: &[Piece<'_>]
     let look = look(pieces, owners);
     let (mut keeps, mut at_lu) = (true, 0.0);
     for index in 0..chain.intervals.len() {
-        if at_lu >= way_lu {
+        // The first interval begins with a state that is given.
+        if index > 0 && at_lu >= way_lu {
             break;
         }
         let (start_lu, length_lu) = (chain.intervals[index].start_lu, chain.intervals[index].length_lu());

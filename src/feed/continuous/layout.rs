@@ -17,6 +17,9 @@ const CUTS_RATIO: [f64; 5] = [0.0, 0.08, 0.2, 0.5, 1.0];
 /// One piece of so many is handed out at least before the next plan.
 const STALE_PIECES: usize = 20;
 
+/// Where a plan begins with rising speed its first interval has at least this share of its length.
+const RISE_MIN_SHARE: f64 = 1e-3;
+
 /// Intervals of a plan that are handed out before the next one in any case. Where all of a plan brakes, planning again for each piece would cost more
 /// than a window that is a little shorter. The front is handed out always, and with it all that share its interval: a plan begins where an
 /// interval does.
@@ -119,6 +122,19 @@ impl Layout {
     pub fn frees_start(&mut self) {
         if let Some(junction) = self.chain.junctions.first_mut() {
             junction.speed_squared_lu2_s2 = f64::INFINITY;
+        }
+    }
+
+    /// The plan begins somewhere inside an interval of the plan before, with the speed rising: the first interval ends before that goes on beyond its
+    /// cap, which planning knows at its border only.
+    pub fn cut_rise(&mut self, point: &PathPoint, pieces: &[Piece<'_>]) {
+        let Some(first) = self.chain.intervals.first().filter(|_| self.chain.intervals.len() > 1) else { return };
+        let rise_lu2_s2 = first.cap.velocity_lu_s.powi(2) - point.speed_squared_lu2_s2;
+        // b + h b'/2 is not below b anywhere in between, if b'' is negative.
+        let way_lu = 2.0 * rise_lu2_s2 / point.slope_lu_s2;
+        let length_lu = first.length_lu();
+        if point.slope_lu_s2 > 0.0 && rise_lu2_s2 > 0.0 && way_lu < length_lu {
+            self.split(0, way_lu.max(RISE_MIN_SHARE * length_lu), pieces);
         }
     }
 

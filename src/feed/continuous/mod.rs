@@ -269,6 +269,9 @@ impl Continuous {
         if self.regime.from_lu > 0.0 && known == 0 {
             layout.frees_start();
         }
+        if let (Start::At(point), true) = (start, self.regime.point.is_some() && known == 0) {
+            layout.cut_rise(&point, pieces);
+        }
         layout
     }
 
