@@ -137,7 +137,15 @@ fn fastest(path: &Path, machine: &Loaded, arguments: &TimeArguments) -> Result<O
     let solved =
         collector.solve(&mut |done, total| line.update(|| format!("optimum: {done} of {total} pieces of path")));
     drop(line);
-    solved.map_err(|reason| Failure::unreadable(no_optimum(path, reason)))
+    let optimum = solved.map_err(|reason| Failure::unreadable(no_optimum(path, reason)))?;
+    let unsolved = optimum.unsolved_lines.iter().map(|line| {
+        let name = path.display();
+        let message = format!("{name}: no optimum is found for the motion that begins in line {line}");
+        Diagnostic::warning("P0012", message)
+            .help("the control's own motion stands in its place: the true optimum is no slower")
+    });
+    show(&unsolved.collect::<Vec<_>>());
+    Ok(optimum)
 }
 
 fn no_optimum(path: &Path, reason: NoOptimum) -> Diagnostic {
@@ -148,10 +156,6 @@ fn no_optimum(path: &Path, reason: NoOptimum) -> Diagnostic {
                 "{name}: the optimum is found for {pieces_max} pieces of path between two rests at most, and here are {pieces}"
             );
             Diagnostic::error("P0011", message).help("cut the program into parts that begin and end at rest")
-        }
-        NoOptimum::NotSolved { line } => {
-            let message = format!("{name}: no optimum is found for the motion that begins in line {line}");
-            Diagnostic::error("P0012", message).help("leave out --optimal")
         }
         NoOptimum::NotBuilt => Diagnostic::error("P0013", "this `sollwert` was built without `--optimal`")
             .help("build it with the feature `optimal`, which is on by default"),
@@ -164,6 +168,7 @@ fn optimum_json(optimum: &Optimum, cycle_time_s: f64) -> serde_json::Value {
         "share": share(optimum, cycle_time_s),
         "grid_points": optimum.grid_points,
         "rounds": optimum.rounds,
+        "unsolved_lines": optimum.unsolved_lines,
     })
 }
 

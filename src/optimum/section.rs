@@ -63,7 +63,7 @@ pub(super) fn solve(parts: Vec<Part>, progress: &mut dyn FnMut(usize, usize)) ->
                 if pieces.len() > PIECES_MAX {
                     return Err(NoOptimum::TooLong { pieces: pieces.len(), pieces_max: PIECES_MAX });
                 }
-                let motion = Section::new(&pieces).solved(&mut optimum, &mut || progress(done, total))?;
+                let motion = Section::new(&pieces).solved(&mut optimum, &mut || progress(done, total));
                 done += pieces.len();
                 optimum.time_s += motion.time_s;
                 optimum.motions.push(motion);
@@ -105,7 +105,7 @@ impl<'a> Section<'a> {
         Self { pieces, grid, profile, far, converged: false }
     }
 
-    fn solved(mut self, optimum: &mut Optimum, progress: &mut dyn FnMut()) -> Result<OptimalMotion, NoOptimum> {
+    fn solved(mut self, optimum: &mut Optimum, progress: &mut dyn FnMut()) -> OptimalMotion {
         let mut grid_s = f64::INFINITY;
         for number in 0..GRIDS_MAX {
             let coarser = (self.grid.clone(), self.profile.clone());
@@ -122,7 +122,9 @@ impl<'a> Section<'a> {
                     break;
                 }
                 let line = self.pieces.first().map_or(0, |piece| piece.path.contour.block.line);
-                return Err(NoOptimum::NotSolved { line });
+                optimum.unsolved_lines.push(line);
+                let path = self.pieces.iter().map(|piece| piece.path.clone()).collect();
+                return OptimalMotion { path, ..driven_motion(self.pieces) };
             };
             self.converged = (grid_s - time_s).abs() <= GRID_GAIN_RATIO * time_s;
             grid_s = time_s;
@@ -140,7 +142,7 @@ impl<'a> Section<'a> {
             }
         }
         optimum.grid_points += self.grid.intervals.len() + 1;
-        Ok(self.motion(best))
+        self.motion(best)
     }
 
     /// Some intervals cut in two.

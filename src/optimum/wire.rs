@@ -15,6 +15,8 @@ pub struct Optimum {
     pub grid_points: usize,
     /// Problems that were solved.
     pub rounds: usize,
+    /// Lines in which motions begin for which the solver found nothing: the control's motion stands in their place.
+    pub unsolved_lines: Vec<u32>,
     /// The motions between rests, in order.
     pub motions: Vec<OptimalMotion>,
 }
@@ -51,11 +53,6 @@ pub enum NoOptimum {
         pieces: usize,
         /// As many are solved.
         pieces_max: usize,
-    },
-    /// The solver found no motion; the line of the first block.
-    NotSolved {
-        /// Line of the first block of the motion.
-        line: u32,
     },
     /// Built without the feature `optimal`.
     NotBuilt,

@@ -33,5 +33,8 @@ pub fn times(seed: u64) -> Result<Times, String> {
         collector.push(piece);
     }
     let optimum = collector.solve(&mut |_, _| {}).map_err(|reason| format!("{reason:?}"))?;
+    if let [line, ..] = optimum.unsolved_lines[..] {
+        return Err(format!("nothing found from line {line} on"));
+    }
     Ok(Times { control_s: control_s - optimum.rest_s, optimum_s: optimum.time_s - optimum.rest_s })
 }

@@ -67,6 +67,27 @@ fn g643_leaves_the_line_axis_by_axis() {
     assert!(middle <= 0.1 * f64::sqrt(2.0) + 1e-9 && middle > 0.1, "{middle}");
 }
 
+/// Whatever the ranges of the axes differ by, no piece of the blend is as short as rounding; the corner is no further away than
+/// both axes together may deviate.
+#[test]
+fn g643_has_no_splinters_where_ranges_are_almost_equal() {
+    for exponent in 1..=15 {
+        for sign in [-1.0, 1.0] {
+            let turn = FRAC_PI_2 + sign * 10.0_f64.powi(-exponent);
+            let pieces = contour(&bend(turn, PathMode::G643, 0.1));
+            let Curve::Polynomial(curve) = blends(&pieces)[0] else { panic!("a polynomial") };
+            let mut borders: Vec<f64> = [0.0, curve.length_lu()].into_iter().chain(curve.nodes_lu()).collect();
+            borders.sort_by(f64::total_cmp);
+            let shortest = borders.windows(2).map(|pair| pair[1] - pair[0]).filter(|lu| *lu > 0.0);
+            let shortest = shortest.fold(f64::INFINITY, f64::min);
+            assert!(shortest > 2e-4 * curve.length_lu(), "{turn}: {shortest} of {}", curve.length_lu());
+            let curve = blends(&pieces)[0];
+            let nearest = samples(curve).map(|q| (q - vector(&[50.0, 0.0])).norm()).fold(f64::INFINITY, f64::min);
+            assert!(nearest <= 0.1 * f64::sqrt(2.0) + 1e-9, "{turn}: {nearest}");
+        }
+    }
+}
+
 #[test]
 fn polynomial_blends_have_no_step_of_curvature() {
     for mode in [PathMode::G643, PathMode::G644] {
