@@ -118,6 +118,12 @@ impl Knob {
         if self.is_share() { (value / (1.0 - value)).ln() } else { value.ln() }
     }
 
+    /// The range of it.
+    pub(super) fn free_range(self) -> (f64, f64) {
+        let (low, high) = self.range();
+        (self.free(low), self.free(high))
+    }
+
     /// And back, into the range.
     pub(super) fn value(self, free: f64) -> f64 {
         let (low, high) = self.range();

@@ -7,7 +7,7 @@
 //! mechanics, `beyond` looks at what their law does not have, `aliasing`
 //! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` and
 //! `plan_control` write the programs to record. `profile`, `knobs`,
-//! `search`, `choose`, `contradict` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
+//! `search`, `shape`, `words`, `choose`, `contradict` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
 //! Does not tune anything, and takes nothing from a machine file that it says it has identified.
 
 mod aliasing;
@@ -29,9 +29,11 @@ mod profile;
 mod record;
 mod refine;
 mod search;
+mod shape;
 mod speed_loop;
 mod staged;
 mod wire;
+mod words;
 mod write;
 
 pub use axis::{IdentifyOptions, identify};

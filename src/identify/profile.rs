@@ -7,8 +7,9 @@
 
 use crate::base::units::mm_s_from_mm_min;
 use crate::base::{AxisId, AxisKind};
+use crate::interpolator::Interpolator;
 use crate::interpreter::{Event, Setup};
-use crate::kernel::{Kernel, Status};
+use crate::kernel::{PieceSource, Preparation};
 use crate::machine::Machine;
 use crate::trace::{Clock, Method, Signal, Trace, TraceEvent};
 use std::sync::Arc;
@@ -124,19 +125,21 @@ impl PathProfile {
 
     /// Of a program as this machine plans it; `None` after an alarm, and where it goes on for an hour and four times as long as the trace did.
     pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId], traced_s: f64) -> Option<Self> {
-        let mut kernel = Kernel::new(machine.clone(), setup.clone(), false);
+        // Set-points alone: what a kernel adds to them (tool, drives, rows) takes twice as long as they do.
+        let mut source = Preparation::new(setup.clone(), machine);
+        let mut interpolator = Interpolator::new(machine);
         let period_s = machine.cycle.time_base.seconds(machine.cycle.time_base.ticks_per_setpoint());
         let mut places = Vec::new();
         let (mut feed_sum, mut feed_count) = (0.0, 0.0_f64);
         // Until the program says otherwise all of it is.
         let mut traced = true;
-        let cycles_max = ((ENDLESS_S + 4.0 * traced_s) / period_s) as usize;
+        let cycles_max = ((ENDLESS_S + 4.0 * traced_s) / period_s) as u64;
         for cycle in 0.. {
             if cycle > cycles_max || places.len() > SETPOINTS_MAX {
                 return None;
             }
-            let status = kernel.cycle().ok()?;
-            for event in kernel.output().begun.iter().flat_map(|begun| &begun.events) {
+            let setpoint = interpolator.sample(cycle, &mut || source.next_piece());
+            for event in interpolator.begun().iter().flat_map(|begun| &begun.events) {
                 let Event::Trace(starts) = event else { continue };
                 if *starts {
                     places.clear();
@@ -144,22 +147,17 @@ impl PathProfile {
                 }
                 traced = *starts;
             }
-            if !traced {
-                if status == Status::Finished {
-                    break;
-                }
-                continue;
-            }
-            if let Some(setpoint) = kernel.output().setpoint {
+            let Some(setpoint) = setpoint else { break };
+            if traced {
                 places.push(axes.iter().map(|id| setpoint.axes[*id].position_lu).collect());
                 if let (Some(feed), false) = (setpoint.path.programmed_feed_lu_s, setpoint.path.rotary_only) {
                     feed_sum += feed;
                     feed_count += 1.0;
                 }
             }
-            if status == Status::Finished {
-                break;
-            }
+        }
+        if source.take_findings().alarm.is_some() {
+            return None;
         }
         Self::of(&places, period_s, feed_sum / feed_count.max(1.0))
     }

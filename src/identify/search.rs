@@ -13,6 +13,7 @@ use crate::machine::Machine;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A traced program.
 pub(super) struct Target {
@@ -36,7 +37,7 @@ const STEPS: [f64; 3] = [0.02, 0.06, 0.007];
 /// The same for what is told: wide enough to see where a limit ceases to hold.
 const SIDE_STEP: f64 = 0.1;
 /// Longest step of a free number in one pass: the law is bent.
-const STEP_MAX: f64 = 0.8;
+pub(super) const STEP_MAX: f64 = 0.8;
 /// Sideways distances are counted in this: alone, and beside ln(feed): 1 um there is as much as 1 % of feed.
 const SIDEWAYS_MM: (f64, f64) = (1e-3, 0.1);
 /// Pull to where a knob began, in RMS of ln(feed) for a free number that is off by 1.
@@ -67,10 +68,20 @@ pub(super) struct Fit<'a> {
     pub(super) targets: &'a [Target],
     /// Values of all knobs that have been moved.
     pub(super) values: Vec<(Knob, f64)>,
-    pub(super) plans: usize,
+    /// Programs planned, by this fit and by those cloned from it.
+    pub(super) plans: Arc<AtomicUsize>,
 }
 
-impl Fit<'_> {
+impl<'a> Fit<'a> {
+    pub(super) fn new(machine: Machine, targets: &'a [Target]) -> Self {
+        Self { machine, targets, values: Vec::new(), plans: Arc::default() }
+    }
+
+    /// Programs planned until now.
+    pub(super) fn plans(&self) -> usize {
+        self.plans.load(Ordering::Relaxed)
+    }
+
     pub(super) fn machine_with(&self, values: &[(Knob, f64)]) -> Machine {
         let mut machine = self.machine.clone();
         for (knob, value) in values {
@@ -97,6 +108,7 @@ impl Fit<'_> {
         let mut all = Vec::new();
         let share = 1.0 / (self.targets.len() as f64).sqrt();
         for target in self.targets {
+            self.plans.fetch_add(1, Ordering::Relaxed);
             let planned = PathProfile::planned(&machine, &target.setup, &target.axes, target.profile.time_s)?;
             if aim == Aim::Both {
                 let floor = FLOOR_SHARE * target.profile.feeds_mm_s.iter().sum::<f64>() / CELLS as f64;
@@ -112,13 +124,12 @@ impl Fit<'_> {
         all.iter().all(|r| r.is_finite()).then_some(all)
     }
 
-    fn residuals(&self, values: &[(Knob, f64)], aim: Aim) -> Option<Vec<f64>> {
+    pub(super) fn residuals(&self, values: &[(Knob, f64)], aim: Aim) -> Option<Vec<f64>> {
         self.residuals_of(self.machine_with(values), aim)
     }
 
     /// Cost at the present values on other machines, planned side by side.
-    pub(super) fn costs(&mut self, machines: &[Machine], aim: Aim) -> Vec<Option<f64>> {
-        self.plans += machines.len() * self.targets.len();
+    pub(super) fn costs(&self, machines: &[Machine], aim: Aim) -> Vec<Option<f64>> {
         let with_values = |machine: &Machine| {
             let mut machine = machine.clone();
             self.values.iter().for_each(|(knob, value)| knob.set(&mut machine, *value));
@@ -128,8 +139,7 @@ impl Fit<'_> {
     }
 
     /// Mean squares of what machines with other words do otherwise, at the present values; `None` after an alarm.
-    pub(super) fn differences(&mut self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
-        self.plans += (others.len() + 1) * self.targets.len();
+    pub(super) fn differences(&self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
         let Some(base) = self.residuals(&self.values, aim) else { return vec![None; others.len()] };
         let difference = |other: &Machine| {
             let mut machine = other.clone();
@@ -140,8 +150,14 @@ impl Fit<'_> {
         others.par_iter().map(difference).collect()
     }
 
+    /// Mean square of what another fit does otherwise.
+    pub(super) fn difference(&self, other: &Self, aim: Aim) -> Option<f64> {
+        let [base, moved] = [self, other].map(|fit| fit.residuals(&fit.values, aim));
+        Some(base?.iter().zip(&moved?).map(|(a, b)| (a - b) * (a - b)).sum())
+    }
+
     /// Columns d residuals / d free number.
-    fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim, wide: f64) -> Vec<Option<Vec<f64>>> {
+    fn columns(&self, base: &[f64], knobs: &[Knob], aim: Aim, wide: f64) -> Vec<Option<Vec<f64>>> {
         let step = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
             // Towards the middle of the range where there is an end of it within the step.
@@ -154,13 +170,12 @@ impl Fit<'_> {
 
     /// The same with given steps; `None` for a knob that stands at an end of its range, and after an alarm.
     fn slopes(
-        &mut self,
+        &self,
         base: &[f64],
         knobs: &[Knob],
         aim: Aim,
         step: impl Fn(&Knob) -> f64 + Sync,
     ) -> Vec<Option<Vec<f64>>> {
-        self.plans += knobs.len() * self.targets.len();
         let column = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
             let moved = knob.value(now + step(knob));
@@ -175,15 +190,13 @@ impl Fit<'_> {
     }
 
     /// Cost at the present values.
-    pub(super) fn cost(&mut self, aim: Aim) -> Option<f64> {
-        self.plans += self.targets.len();
+    pub(super) fn cost(&self, aim: Aim) -> Option<f64> {
         self.residuals(&self.values, aim).map(|residuals| square(&residuals))
     }
 
     /// Turns `knobs` until the cost is least, or below `enough`. Returns it, without the pull. Columns are planned where they must be, and between two
     /// such passes carried on by what each step shows (Broyden): a step costs a plan or two instead of one a knob.
     pub(super) fn run(&mut self, knobs: &[Knob], aim: Aim, passes: usize, enough: f64) -> Option<f64> {
-        self.plans += self.targets.len();
         let origin: Vec<f64> = knobs.iter().map(|knob| knob.free(knob.get(&self.machine))).collect();
         let pull = |free: &[f64]| free.iter().zip(&origin).map(|(f, o)| (PULL * (f - o)).powi(2)).sum::<f64>();
         let mut free: Vec<f64> = knobs.iter().map(|knob| knob.free(self.value(*knob))).collect();
@@ -236,7 +249,7 @@ impl Fit<'_> {
 
     /// The better of two steps of unlike damping, with more of it until one helps: values, residuals, free numbers, and the damping from here on.
     fn step(
-        &mut self,
+        &self,
         knobs: &[Knob],
         aim: Aim,
         columns: &[Option<Vec<f64>>],
@@ -256,23 +269,20 @@ impl Fit<'_> {
             let residuals = self.residuals(&values, aim)?;
             Some((square(&residuals) + pull(&free), (values, residuals, free, damping)))
         };
-        let (mut damping, mut tries, mut plans) = (damping, if fresh { TRIES } else { 1 }, 0);
+        let (mut damping, mut tries) = (damping, if fresh { TRIES } else { 1 });
         let mut found = None;
         while found.is_none() && tries > 0 && damping < DAMPING.2 {
-            plans += 2 * self.targets.len();
             let both: Vec<Option<(f64, Step)>> = [damping, damping * WORSE].par_iter().map(|d| trial(*d)).collect();
             let best = both.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
             found = best.filter(|(cost, _)| *cost < at.before).map(|(_, step)| step);
             damping *= WORSE * WORSE;
             tries -= 1;
         }
-        self.plans += plans;
         found.map(|(values, residuals, free, used)| (values, residuals, free, (used * BETTER).max(DAMPING.1)))
     }
 
     /// What the motion tells about each knob at the present values, below them and above; `None` after an alarm.
-    pub(super) fn told(&mut self, knobs: &[Knob], aim: Aim) -> Option<[Told; 2]> {
-        self.plans += self.targets.len();
+    pub(super) fn told(&self, knobs: &[Knob], aim: Aim) -> Option<[Told; 2]> {
         let base = self.residuals(&self.values, aim)?;
         let left = square(&base).sqrt().hypot(GRAIN);
         let mut sides = Vec::new();

@@ -159,6 +159,25 @@ const CASES: &[Case] = &[
         ],
     },
     Case {
+        name: "quintic",
+        sets: &[
+            "smoothing.shape=quintic",
+            "smoothing.alpha=2.0",
+            "smoothing.tolerance_ratio=0.9",
+            "smoothing.radial_jerk_share=0.35",
+        ],
+    },
+    Case {
+        name: "modern",
+        sets: &[
+            "smoothing.shape=quintic",
+            "feed.time_law=continuous",
+            "look_ahead.blocks=100",
+            "axes.X.transition_jerk_max_m_s3=25",
+            "axes.Y.transition_jerk_max_m_s3=20",
+        ],
+    },
+    Case {
         name: "everything",
         sets: &[
             "feed.time_law=continuous",
