@@ -201,7 +201,8 @@ impl<'a, 'b> Search<'a, 'b> {
         if of.take_window(&window_costs(&of.fit)) {
             of.run(&common, PASSES.0);
         }
-        let all: Vec<Knob> = Knob::SHAPE.into_iter().chain(knobs_of_time(words, Some(&self.axes))).collect();
+        let shape = if of.fit.has_paths() { &[][..] } else { &Knob::SHAPE };
+        let all: Vec<Knob> = shape.iter().copied().chain(knobs_of_time(words, Some(&self.axes))).collect();
         for _ in 0..ROUNDS {
             self.tell("axis by axis, with the shape", of);
             of.run(&all, PASSES.1);

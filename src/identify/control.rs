@@ -9,6 +9,7 @@
 use super::choose::{Search, Window};
 use super::contradict::{contradiction, nothing_fits};
 use super::knobs::{Knob, Switch};
+use super::path::PathOfTrace;
 use super::profile::{PathProfile, linear_axes, shared_axes};
 use super::search::{Aim, Fit, Target, Told};
 use super::shape::{quick, shape};
@@ -129,7 +130,7 @@ pub fn calibrate(
     result.plans = fit.plans();
     let (old, new) = (Arc::new(machine.clone()), Arc::new(after));
     for pair in fitted.iter().chain(unseen) {
-        let (target, axes) = target(pair, machine)?;
+        let (target, axes, _) = target(pair, machine)?;
         let one = |machine: &Arc<Machine>| {
             PathProfile::planned(machine, &pair.setup, &axes, target.time_s).ok_or_else(|| refused(ALARM))
         };
@@ -155,7 +156,7 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
     let mut targets = Vec::new();
     let mut moved: Vec<AxisId> = Vec::new();
     for pair in fitted {
-        let (profile, axes) = target(pair, machine)?;
+        let (profile, axes, rows) = target(pair, machine)?;
         let before = PathProfile::planned(&Arc::new(machine.clone()), &pair.setup, &axes, profile.time_s)
             .ok_or_else(|| refused(ALARM))?;
         if (before.length_mm / profile.length_mm - 1.0).abs() > LENGTH_SHARE {
@@ -178,7 +179,8 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
                 moved.push(*id);
             }
         }
-        targets.push(Target { profile, setup: pair.setup.clone(), axes });
+        let path = rows.and_then(|rows| PathOfTrace::new(&rows, &pair.setup, machine, &axes));
+        targets.push(Target { profile, path, setup: pair.setup.clone(), axes });
     }
     if targets.is_empty() { Err(refused("no program is given")) } else { Ok((targets, moved)) }
 }
@@ -312,17 +314,20 @@ fn refused(reason: &str) -> Diagnostic {
         .help("trace the set-points of the whole program, and give the same program with its zero offsets and tools")
 }
 
-/// What a trace says of its program, and the axes whose path is held against it.
-fn target(pair: &TracedProgram<'_>, machine: &Machine) -> Result<(PathProfile, Vec<AxisId>), Diagnostic> {
+/// What a trace says of its program, the axes whose path is held against it, and their set-points.
+type Traced = (PathProfile, Vec<AxisId>, Option<Vec<Vec<f64>>>);
+
+fn target(pair: &TracedProgram<'_>, machine: &Machine) -> Result<Traced, Diagnostic> {
     let axes = shared_axes(pair.trace, machine);
     let name = &pair.trace.name;
     if axes.len() >= 2 {
-        return PathProfile::of_trace(pair.trace, machine, &axes)
-            .map(|profile| (profile, axes))
+        let rows = PathProfile::rows(pair.trace, machine, &axes);
+        return rows
+            .and_then(|rows| PathProfile::of_rows(&rows).map(|profile| (profile, axes, Some(rows.0))))
             .ok_or_else(|| refused(&format!("the set-points of `{name}` do not move, or have gaps")));
     }
     let count = axes.len();
-    PathProfile::of_feed(pair.trace).map(|profile| (profile, linear_axes(machine))).ok_or_else(|| {
+    PathProfile::of_feed(pair.trace).map(|profile| (profile, linear_axes(machine), None)).ok_or_else(|| {
         refused(&format!(
             "`{name}` has position set-points of {count} linear axes of this machine, and no feed along the path"
         ))

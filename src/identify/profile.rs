@@ -72,8 +72,8 @@ pub(super) fn shared_axes(trace: &Trace, machine: &Machine) -> Vec<AxisId> {
 }
 
 impl PathProfile {
-    /// Of the set-points of a trace; `None` without motion or with gaps.
-    pub(super) fn of_trace(trace: &Trace, machine: &Machine, axes: &[AxisId]) -> Option<Self> {
+    /// Set-points of a trace a period apart, and the period; `None` with gaps.
+    pub(super) fn rows(trace: &Trace, machine: &Machine, axes: &[AxisId]) -> Option<(Vec<Vec<f64>>, f64)> {
         let signals: Option<Vec<&Signal>> =
             axes.iter().map(|id| trace.axis_signal(&machine.axis(*id).name, "position_setpoint")).collect();
         let signals = signals?;
@@ -95,7 +95,12 @@ impl PathProfile {
         let places: Vec<Vec<f64>> =
             (0..times.len()).map(|k| columns.iter().map(|column| column[k]).collect()).collect();
         let complete = places.iter().flatten().all(|value| value.is_finite());
-        complete.then(|| Self::of(&places, period_s, 0.0)).flatten()
+        complete.then_some((places, period_s))
+    }
+
+    /// Of the set-points of a trace; `None` without motion.
+    pub(super) fn of_rows((places, period_s): &(Vec<Vec<f64>>, f64)) -> Option<Self> {
+        Self::of(places, *period_s, 0.0)
     }
 
     /// Of the feed along the path of a trace; `None` without it.

@@ -6,6 +6,7 @@
 //! stays there. Columns of differences are planned side by side. Does not choose words.
 
 use super::knobs::Knob;
+use super::path::PathOfTrace;
 use super::profile::{CELLS, PathProfile};
 use crate::base::AxisId;
 use crate::interpreter::Setup;
@@ -18,6 +19,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// A traced program.
 pub(super) struct Target {
     pub(super) profile: PathProfile,
+    /// Its set-points beside the path; `None` where that cannot be had without time.
+    pub(super) path: Option<PathOfTrace>,
     pub(super) setup: Setup,
     pub(super) axes: Vec<AxisId>,
 }
@@ -77,6 +80,11 @@ impl<'a> Fit<'a> {
         Self { machine, targets, values: Vec::new(), plans: Arc::default() }
     }
 
+    /// The shape of the corners is told by the paths of all programs alone.
+    pub(super) fn has_paths(&self) -> bool {
+        self.targets.iter().all(|target| target.path.is_some())
+    }
+
     /// Programs planned until now.
     pub(super) fn plans(&self) -> usize {
         self.plans.load(Ordering::Relaxed)
@@ -108,6 +116,10 @@ impl<'a> Fit<'a> {
         let mut all = Vec::new();
         let share = 1.0 / (self.targets.len() as f64).sqrt();
         for target in self.targets {
+            if let (Aim::Shape, Some(path)) = (aim, &target.path) {
+                all.extend(path.off_mm(&machine)?.iter().map(|off| off * share / SIDEWAYS_MM.0));
+                continue;
+            }
             self.plans.fetch_add(1, Ordering::Relaxed);
             let planned = PathProfile::planned(&machine, &target.setup, &target.axes, target.profile.time_s)?;
             if aim == Aim::Both {
