@@ -21,13 +21,15 @@ const ROUNDS: usize = 4;
 /// RMS of ln(feed) that is as good as none: where no word need be tried (numbers of each axis make up for a wrong word to 0.2 % on the program of the fit, and miss
 /// another one by 3 %), and where a fit ends.
 const LITTLE_LEFT: f64 = 1.5e-3;
+/// The same under the law of the least time, whose plans are a thousandth of their time from what they might be, and change in steps with their numbers.
+const LITTLE_LEFT_CONTINUOUS: f64 = 2.5e-3;
 const NONE_LEFT: f64 = 1e-4;
 /// Another word must leave less than this share of the cost over.
 const BETTER_SHARE: f64 = 0.8;
 /// Share of the cost by which two windows differ that are one.
 pub(super) const SAME_SHARE: f64 = 1e-3;
 /// RMS of ln(feed) from which two words drive differently.
-const DIFFERS: f64 = 1e-3;
+pub(super) const DIFFERS: f64 = 1e-3;
 /// Windows that are tried first.
 const WINDOWS: [usize; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 1000];
 /// Windows between two of those that are tried at once.
@@ -50,6 +52,19 @@ pub(super) struct Candidate<'a> {
     pub(super) other_words: usize,
 }
 
+fn other_law(law: TimeLawKind) -> TimeLawKind {
+    match law {
+        TimeLawKind::SevenPhase => TimeLawKind::Continuous,
+        TimeLawKind::Continuous => TimeLawKind::SevenPhase,
+    }
+}
+
+fn with_law(machine: &Machine, law: TimeLawKind) -> Machine {
+    let mut machine = machine.clone();
+    machine.feed.time_law = law;
+    machine
+}
+
 impl<'a> Candidate<'a> {
     /// `None` where the machine ends in an alarm.
     pub(super) fn new(fit: Fit<'a>) -> Option<Self> {
@@ -58,7 +73,11 @@ impl<'a> Candidate<'a> {
     }
 
     pub(super) fn done(&self) -> bool {
-        self.cost.sqrt() <= LITTLE_LEFT
+        self.cost.sqrt() <= if self.is_continuous() { LITTLE_LEFT_CONTINUOUS } else { LITTLE_LEFT }
+    }
+
+    fn is_continuous(&self) -> bool {
+        self.fit.machine.feed.time_law == TimeLawKind::Continuous
     }
 
     pub(super) fn run(&mut self, knobs: &[Knob], passes: usize) {
@@ -149,31 +168,62 @@ impl<'a, 'b> Search<'a, 'b> {
         let mut own = self.best.clone();
         self.fitted(&mut own);
         self.best = own;
-        // The one that is quick to plan first.
-        for law in [TimeLawKind::SevenPhase, TimeLawKind::Continuous] {
-            if self.best.done() {
-                return;
+        if self.best.done() {
+            return;
+        }
+        let law = self.start.machine.feed.time_law;
+        let quick = self.quick(other_law(law));
+        // The other law first where it comes much nearer in a few steps than the present one does with all of them.
+        let other_first = quick.as_ref().is_some_and(|quick| NEAR * quick.cost < self.best.cost);
+        if !other_first {
+            let start = self.start.clone();
+            self.words(&start);
+        }
+        if let Some(mut quick) = quick.filter(|quick| !self.best.done() && quick.cost < NEAR * self.best.cost) {
+            let numbers = quick.fit.clone();
+            self.fitted(&mut quick);
+            if !self.best.as_good_as(&quick) {
+                self.best = quick;
             }
-            self.words(law);
+            self.words(&numbers);
+        }
+        if other_first {
+            let start = self.start.clone();
+            self.words(&start);
         }
     }
 
-    /// All words of a time law, and numbers with them.
-    fn words(&mut self, law: TimeLawKind) {
-        let mut start = self.start.clone();
-        if start.machine.feed.time_law != law {
-            start.machine.feed.time_law = law;
-            self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&start.machine)));
-            let Some(mut quick) = Candidate::new(start.clone()) else { return };
-            quick.take_window(&window_costs(&quick.fit));
-            quick.run(&knobs_of_time(&start.machine, None), PASSES.0);
-            if quick.cost > NEAR * self.best.cost {
-                return;
+    /// A time law after the steps of a round.
+    fn quick(&mut self, law: TimeLawKind) -> Option<Candidate<'a>> {
+        let machine = with_law(&self.start.machine, law);
+        self.say(&format!("{} {}", Switch::TimeLaw.key(), Switch::TimeLaw.word(&machine)));
+        let mut quick = Candidate::new(Fit { machine, ..self.start.clone() })?;
+        quick.other_words = 1;
+        let mut elsewhere = quick.clone();
+        let knobs = knobs_of_time(&quick.fit.machine.clone(), None);
+        quick.run(&knobs, PASSES.0);
+        if elsewhere.take_window(&costs_of(&quick.fit, &WINDOWS))
+            || elsewhere.take_window(&costs_of(&elsewhere.fit, &WINDOWS))
+        {
+            elsewhere.cost = elsewhere.fit.cost(Aim::Both)?;
+            elsewhere.run(&knobs, PASSES.0);
+            if elsewhere.cost < quick.cost {
+                quick = elsewhere;
             }
         }
+        self.tell("a few steps of it", &quick);
+        Some(quick)
+    }
+
+    /// All combinations of the other words.
+    fn words(&mut self, start: &Fit<'a>) {
+        if self.best.done() {
+            return;
+        }
         self.say(&format!("words of {}", Switch::TimeLaw.word(&start.machine)));
-        let windows = window_costs(&start);
-        let winner = tournament(&start, &windows, &self.axes, &mut |what| (self.progress)(what));
+        let windows = window_costs(start);
+        let other_words = usize::from(start.machine.feed.time_law != self.start.machine.feed.time_law);
+        let winner = tournament(start, other_words, &windows, &self.axes, &mut |what| (self.progress)(what));
         let Some(mut winner) = winner else { return };
         self.fitted(&mut winner);
         if !self.best.as_good_as(&winner) {
@@ -191,26 +241,41 @@ impl<'a, 'b> Search<'a, 'b> {
         (self.progress)(&format!("{what} ({percent:.2} % is left over)"));
     }
 
-    /// Numbers and window under the words of a candidate, to the end: one jerk for all axes, the window, then a jerk for each axis and the shape too. The path of
-    /// set-points a cycle apart depends a little on the feed: what the shape is worth is known when the feed is.
+    /// Numbers and window under the words of a candidate, to the end: one jerk for all axes, then a jerk for each axis (and the shape, where the path does not
+    /// tell it alone), then the window.
     fn fitted(&mut self, of: &mut Candidate<'a>) {
         let words = &of.fit.machine.clone();
-        let common = knobs_of_time(words, None);
-        of.run(&common, 2 * PASSES.0);
-        self.tell("look-ahead window", of);
-        if of.take_window(&window_costs(&of.fit)) {
-            of.run(&common, PASSES.0);
-        }
+        of.run(&knobs_of_time(words, None), 2 * PASSES.0);
         let shape = if of.fit.has_paths() { &[][..] } else { &Knob::SHAPE };
         let all: Vec<Knob> = shape.iter().copied().chain(knobs_of_time(words, Some(&self.axes))).collect();
         for _ in 0..ROUNDS {
-            self.tell("axis by axis, with the shape", of);
-            of.run(&all, PASSES.1);
-            if of.done() || !of.take_window(&window_costs(&of.fit)) {
+            self.tell("axis by axis", of);
+            of.run(&all, 2 * PASSES.0);
+            if of.done() || !self.other_window(of, &all) {
                 break;
             }
         }
+        self.tell("to the end", of);
+        // Its plans cost ten times as much, and what they still gain is their own grain.
+        let passes = if of.done() && of.is_continuous() { PASSES.0 } else { PASSES.1 };
+        of.run(&all, passes);
         self.windows_beside(of, &all);
+    }
+
+    /// Takes the window that suits the present numbers best, if it leaves less over with numbers fitted to it: numbers make up for a part of a wrong window, and
+    /// a window for a part of wrong numbers.
+    fn other_window(&mut self, of: &mut Candidate<'a>, knobs: &[Knob]) -> bool {
+        self.tell("look-ahead window", of);
+        let mut trial = of.clone();
+        if !trial.take_window(&window_costs(&of.fit)) {
+            return false;
+        }
+        trial.run(knobs, PASSES.0);
+        let takes = trial.cost < BETTER_SHARE * of.cost;
+        if takes {
+            *of = trial;
+        }
+        takes
     }
 
     /// Windows beside the present one and that of the file, each with numbers fitted to it: numbers that were fitted under a wrong one make up for a part of it, so that
@@ -250,13 +315,9 @@ impl<'a, 'b> Search<'a, 'b> {
         let now = self.best.fit.machine.look_ahead_blocks;
         let most = WINDOWS[WINDOWS.len() - 1].max(2 * now);
         let limit = 1.05 * self.best.cost + DIFFERS * DIFFERS;
-        let mut tried = vec![most, now + 1];
-        tried.extend((1..now).rev().take(1).chain(WINDOWS.into_iter().rev().filter(|blocks| blocks + 1 < now)));
-        let costs = costs_of(&self.best.fit, &tried);
-        let of =
-            |blocks: usize| costs.iter().find(|(tried, _)| *tried == blocks).is_some_and(|(_, cost)| *cost < limit);
-        let below = tried[2..].iter().take_while(|blocks| of(**blocks)).last();
-        let low = below.copied().unwrap_or(now);
+        let of = |blocks: usize| costs_of(&self.best.fit, &[blocks]).iter().any(|(_, cost)| *cost < limit);
+        let below = (1..now).rev().take(1).chain(WINDOWS.into_iter().rev().filter(|blocks| blocks + 1 < now));
+        let low = below.take_while(|blocks| of(*blocks)).last().unwrap_or(now);
         match (of(most), of(now + 1)) {
             (true, _) => Window::AtLeast(low),
             (false, true) => Window::Between(low, now + 1),
@@ -279,20 +340,24 @@ impl<'a, 'b> Search<'a, 'b> {
     /// Which switches are told: the other words all drive differently. What only one of the corner rules has is fitted first.
     pub(super) fn told(&self) -> Vec<(Switch, bool)> {
         let limit = (DIFFERS * DIFFERS).max(self.best.cost);
-        let mut told = Vec::new();
+        let mut others = Vec::new();
         for switch in Switch::TIME {
-            let mut differs = true;
             for machine in switch.others(&self.machine_for(switch)) {
                 let mut other = Fit { machine, ..self.best.fit.clone() };
                 if switch == Switch::CornerRule {
                     let step = knobs_of_time(&other.machine, None).pop();
                     other.run(&step.into_iter().collect::<Vec<_>>(), Aim::Both, PASSES.0, NONE_LEFT * NONE_LEFT);
                 }
-                differs &= self.best.fit.difference(&other, Aim::Both).is_none_or(|square| square > limit);
+                others.push((switch, other.machine_with(&other.values)));
             }
-            told.push((switch, differs));
         }
-        told
+        let machines: Vec<Machine> = others.iter().map(|(_, machine)| machine.clone()).collect();
+        let differences = self.best.fit.differences_of(&machines, Aim::Both);
+        let differs = |switch: Switch| {
+            let of = others.iter().zip(&differences).filter(|((other, _), _)| *other == switch);
+            of.clone().all(|(_, square)| square.is_none_or(|square| square > limit))
+        };
+        Switch::TIME.into_iter().map(|switch| (switch, differs(switch))).collect()
     }
 }
 

@@ -209,6 +209,10 @@ impl Switch {
     pub(super) const TIME: [Self; 6] =
         [Self::TimeLaw, Self::BlendLaw, Self::Limits, Self::CornerRule, Self::CurvatureJump, Self::ArcLimits];
 
+    /// Those of time beside the law.
+    pub(super) const WORDS: [Self; 5] =
+        [Self::BlendLaw, Self::Limits, Self::CornerRule, Self::CurvatureJump, Self::ArcLimits];
+
     pub(super) fn key(self) -> &'static str {
         match self {
             Self::Shape => "smoothing.shape",

@@ -152,20 +152,22 @@ impl<'a> Fit<'a> {
 
     /// Mean squares of what machines with other words do otherwise, at the present values; `None` after an alarm.
     pub(super) fn differences(&self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
-        let Some(base) = self.residuals(&self.values, aim) else { return vec![None; others.len()] };
-        let difference = |other: &Machine| {
+        let with_values = |other: &Machine| {
             let mut machine = other.clone();
             self.values.iter().for_each(|(knob, value)| knob.set(&mut machine, *value));
-            let moved = self.residuals_of(machine, aim)?;
+            machine
+        };
+        self.differences_of(&others.iter().map(with_values).collect::<Vec<_>>(), aim)
+    }
+
+    /// The same of machines as they are.
+    pub(super) fn differences_of(&self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
+        let Some(base) = self.residuals(&self.values, aim) else { return vec![None; others.len()] };
+        let difference = |machine: &Machine| {
+            let moved = self.residuals_of(machine.clone(), aim)?;
             Some(base.iter().zip(&moved).map(|(a, b)| (a - b) * (a - b)).sum())
         };
         others.par_iter().map(difference).collect()
-    }
-
-    /// Mean square of what another fit does otherwise.
-    pub(super) fn difference(&self, other: &Self, aim: Aim) -> Option<f64> {
-        let [base, moved] = [self, other].map(|fit| fit.residuals(&fit.values, aim));
-        Some(base?.iter().zip(&moved?).map(|(a, b)| (a - b) * (a - b)).sum())
     }
 
     /// Columns d residuals / d free number.

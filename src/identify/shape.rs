@@ -13,7 +13,7 @@ use rayon::prelude::*;
 const PASSES: usize = 25;
 const FIRST_PASSES: usize = 3;
 /// RMS of the sideways distances in um that is as good as none.
-const NONE_LEFT: f64 = 0.01;
+const NONE_LEFT: f64 = 1e-3;
 /// Places of the grid from which a fit is begun.
 const BEGINS: usize = 3;
 /// Another curve must leave less than this share of the cost over.

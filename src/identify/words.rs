@@ -12,10 +12,10 @@ use crate::base::units::percent_from_ratio;
 use crate::machine::Machine;
 use rayon::prelude::*;
 
-/// All combinations of words beside the time law, those of the file first, those with few others before those with many.
-fn combinations(machine: &Machine) -> Vec<(usize, Machine)> {
-    let mut all = vec![(0, machine.clone())];
-    for switch in Switch::TIME.into_iter().filter(|switch| *switch != Switch::TimeLaw) {
+/// All combinations of words beside the time law, those of the machine first, those with few others before those with many.
+fn combinations(machine: &Machine, other_words: usize) -> Vec<(usize, Machine)> {
+    let mut all = vec![(other_words, machine.clone())];
+    for switch in Switch::WORDS {
         for place in 0..all.len() {
             let (others, machine) = &all[place];
             let more: Vec<(usize, Machine)> =
@@ -37,12 +37,13 @@ fn first_windows(file: usize, costs: &[(usize, f64)]) -> Vec<usize> {
 }
 
 /// Candidates that move the programs differently.
-fn unlike<'a>(start: &Fit<'a>, windows: &[usize]) -> Vec<Candidate<'a>> {
+fn unlike<'a>(start: &Fit<'a>, other_words: usize, windows: &[usize]) -> Vec<Candidate<'a>> {
     let with = |(words, machine): (usize, Machine)| {
         let under = move |blocks: &usize| (words, Machine { look_ahead_blocks: *blocks, ..machine.clone() });
         windows.iter().map(under).collect::<Vec<_>>()
     };
-    let machines: Vec<(usize, Machine)> = combinations(&start.machine).into_iter().flat_map(with).collect();
+    let machines: Vec<(usize, Machine)> =
+        combinations(&start.machine, other_words).into_iter().flat_map(with).collect();
     let planned = |(other_words, machine): (usize, Machine)| {
         let fit = Fit { machine, ..start.clone() };
         let residuals = fit.residuals(&fit.values, Aim::Both)?;
@@ -64,11 +65,13 @@ fn unlike<'a>(start: &Fit<'a>, windows: &[usize]) -> Vec<Candidate<'a>> {
 /// The combination of words that leaves the least over.
 pub(super) fn tournament<'a>(
     start: &Fit<'a>,
+    other_words: usize,
     windows: &[(usize, f64)],
     axes: &[AxisId],
     progress: &mut dyn FnMut(&str),
 ) -> Option<Candidate<'a>> {
-    let mut candidates = unlike(start, &first_windows(start.machine.look_ahead_blocks, windows));
+    let windows = first_windows(start.machine.look_ahead_blocks, windows);
+    let mut candidates = unlike(start, other_words, &windows);
     let step = |candidate: &mut Candidate<'a>, axes: Option<&[AxisId]>, passes: usize| {
         if axes.is_some() {
             candidate.step_window();
