@@ -259,7 +259,24 @@ impl<'a, 'b> Search<'a, 'b> {
         // Its plans cost ten times as much, and what they still gain is their own grain.
         let passes = if of.done() && of.is_continuous() { PASSES.0 } else { PASSES.1 };
         of.run(&all, passes);
+        self.around(of, &all);
         self.windows_beside(of, &all);
+    }
+
+    /// Where a fit stands in a bend of limits that take turns, the stretches that are explained already lead on: those that are far off count little for a while.
+    fn around(&mut self, of: &mut Candidate<'a>, knobs: &[Knob]) {
+        if of.done() {
+            return;
+        }
+        self.tell("what is far off counts less", of);
+        let mut trial = of.clone();
+        trial.fit.by_logarithm = true;
+        trial.run(knobs, 2 * PASSES.0);
+        trial.fit.by_logarithm = false;
+        trial.run(knobs, PASSES.1);
+        if trial.cost < of.cost {
+            *of = trial;
+        }
     }
 
     /// Takes the window that suits the present numbers best, if it leaves less over with numbers fitted to it: numbers make up for a part of a wrong window, and

@@ -71,13 +71,15 @@ pub(super) struct Fit<'a> {
     pub(super) targets: &'a [Target],
     /// Values of all knobs that have been moved.
     pub(super) values: Vec<(Knob, f64)>,
+    /// Differences of feed beyond the grain count by their logarithm: a few stretches that are far off do not hold the others.
+    pub(super) by_logarithm: bool,
     /// Programs planned, by this fit and by those cloned from it.
     pub(super) plans: Arc<AtomicUsize>,
 }
 
 impl<'a> Fit<'a> {
     pub(super) fn new(machine: Machine, targets: &'a [Target]) -> Self {
-        Self { machine, targets, values: Vec::new(), plans: Arc::default() }
+        Self { machine, targets, values: Vec::new(), by_logarithm: false, plans: Arc::default() }
     }
 
     /// The shape of the corners is told by the paths of all programs alone.
@@ -126,7 +128,8 @@ impl<'a> Fit<'a> {
                 let floor = FLOOR_SHARE * target.profile.feeds_mm_s.iter().sum::<f64>() / CELLS as f64;
                 let weight = share / (CELLS as f64).sqrt();
                 let feeds = planned.feeds_mm_s.iter().zip(&target.profile.feeds_mm_s);
-                all.extend(feeds.map(|(a, b)| weight * ((a + floor) / (b + floor)).ln()));
+                let counts = |off: f64| if self.by_logarithm { GRAIN * (off / GRAIN).asinh() } else { off };
+                all.extend(feeds.map(|(a, b)| weight * counts(((a + floor) / (b + floor)).ln())));
                 all.push(share * (planned.time_s / target.profile.time_s).ln());
             }
             let unit_mm = if aim == Aim::Both { SIDEWAYS_MM.1 } else { SIDEWAYS_MM.0 };
