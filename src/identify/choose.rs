@@ -173,15 +173,15 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         let law = self.start.machine.feed.time_law;
         let quick = self.quick(other_law(law));
-        // The other law first where it comes much nearer in a few steps than the present one does with all of them.
-        let other_first = quick.as_ref().is_some_and(|quick| NEAR * quick.cost < self.best.cost);
+        // Which law is asked first decides about time alone: the other one is asked, too, unless the first leaves nothing over.
+        let other_first = quick.as_ref().is_some_and(|quick| quick.cost < 0.5 * self.best.cost);
         if !other_first {
             let start = self.start.clone();
             self.words(&start);
         }
         if let Some(mut quick) = quick.filter(|quick| !self.best.done() && quick.cost < NEAR * self.best.cost) {
-            let numbers = quick.fit.clone();
             self.fitted(&mut quick);
+            let numbers = quick.fit.clone();
             if !self.best.as_good_as(&quick) {
                 self.best = quick;
             }

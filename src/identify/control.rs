@@ -13,7 +13,7 @@ use super::path::PathOfTrace;
 use super::profile::{PathProfile, linear_axes, shared_axes};
 use super::search::{Aim, Fit, Target, Told};
 use super::shape::{quick, shape};
-use crate::base::units::{MM_PER_M, percent_from_ratio};
+use crate::base::units::{MM_PER_INCH, MM_PER_M, percent_from_ratio};
 use crate::base::{AxisId, Diagnostic};
 use crate::interpreter::Setup;
 use crate::machine::Machine;
@@ -119,6 +119,9 @@ pub fn calibrate(
     progress("shape of the corners");
     let told_shape = shape(&mut fit, progress);
     fit.machine.feed.time_law = machine.feed.time_law;
+    if let Some(finding) = another_path(&fit) {
+        return Err(finding);
+    }
     let mut search = Search::new(fit, moved, progress).ok_or_else(|| refused(ALARM))?;
     search.run();
     words(&mut result, &mut search, told_shape);
@@ -160,8 +163,11 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
         let before = PathProfile::planned(&Arc::new(machine.clone()), &pair.setup, &axes, profile.time_s)
             .ok_or_else(|| refused(ALARM))?;
         if (before.length_mm / profile.length_mm - 1.0).abs() > LENGTH_SHARE {
+            let inches = (before.length_mm / profile.length_mm / MM_PER_INCH - 1.0).abs() < LENGTH_SHARE;
+            let hint =
+                if inches { ": the positions of the trace are in inches, say so in its row of units" } else { "" };
             return Err(refused(&format!(
-                "the path of the trace is {:.3} mm long, that of the program {:.3} mm",
+                "the path of the trace is {:.3} mm long, that of the program {:.3} mm{hint}",
                 profile.length_mm, before.length_mm
             )));
         }
@@ -184,6 +190,23 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
     }
     if targets.is_empty() { Err(refused("no program is given")) } else { Ok((targets, moved)) }
 }
+
+/// A path that the best corners leave as far off as no rounding at all would: another program.
+fn another_path(fit: &Fit<'_>) -> Option<Diagnostic> {
+    let left_um = fit.path_left_um(None)?;
+    let unrounded_um = fit.path_left_um(Some(Knob::Ratio.value(f64::NEG_INFINITY)))?;
+    (left_um > ALIKE_UM && left_um > UNROUNDED_SHARE * unrounded_um).then(|| {
+        refused(&format!(
+            "with the best rounding of corners the paths of trace and program are {left_um:.0} um apart (RMS), without any rounding {unrounded_um:.0} um: \
+             it is the trace of another program, or of other offsets, tools or units"
+        ))
+    })
+}
+
+/// RMS below which paths are alike whatever rounding explains: five steps of a scale of 1 um.
+const ALIKE_UM: f64 = 5.0;
+/// What the best corners must explain of what rounding does.
+const UNROUNDED_SHARE: f64 = 0.5;
 
 /// An axis that moves less tells nothing.
 const MOVED_MM: f64 = 0.1;

@@ -11,7 +11,7 @@ use crate::interpolator::Interpolator;
 use crate::interpreter::{Event, Setup};
 use crate::kernel::{PieceSource, Preparation};
 use crate::machine::Machine;
-use crate::trace::{Clock, Method, Signal, Trace, TraceEvent};
+use crate::trace::{Clock, Method, Signal, TimeGrid, Trace, TraceEvent};
 use std::sync::Arc;
 
 /// Stretches of a path.
@@ -47,6 +47,16 @@ fn traced_between_s(trace: &Trace) -> Option<[f64; 2]> {
     Some([from_s, of("stop").filter(|to_s| *to_s > from_s).unwrap_or(f64::INFINITY)])
 }
 
+/// Rows are missing: one alone is bridged, more are not.
+fn has_gap(times: &TimeGrid) -> bool {
+    if matches!(times, TimeGrid::Uniform { .. }) {
+        return false;
+    }
+    let all: Vec<f64> = times.iter().collect();
+    let longest_s = all.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    times.period_s().is_some_and(|period_s| longest_s > 2.5 * period_s)
+}
+
 /// A motion on equal stretches of its path.
 #[derive(Clone, Debug)]
 pub(super) struct PathProfile {
@@ -79,6 +89,9 @@ impl PathProfile {
         let signals = signals?;
         let grid = &signals.first()?.times;
         let (mut start_s, mut end_s, period_s) = (grid.start_s()?, grid.end_s()?, grid.period_s()?);
+        if has_gap(grid) {
+            return None;
+        }
         if let Some([from_s, to_s]) = traced_between_s(trace) {
             (start_s, end_s) = (start_s.max(from_s), end_s.min(to_s));
         }

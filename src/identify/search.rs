@@ -43,6 +43,7 @@ const SIDE_STEP: f64 = 0.1;
 pub(super) const STEP_MAX: f64 = 0.8;
 /// Sideways distances are counted in this: alone, and beside ln(feed): 1 um there is as much as 1 % of feed.
 const SIDEWAYS_MM: (f64, f64) = (1e-3, 0.1);
+const UM_MM: f64 = 1e-3;
 /// Pull to where a knob began, in RMS of ln(feed) for a free number that is off by 1.
 const PULL: f64 = 2e-4;
 /// Share of the mean feed below which feeds count as alike: the ends of a motion are no matter of ratios.
@@ -85,6 +86,16 @@ impl<'a> Fit<'a> {
     /// The shape of the corners is told by the paths of all programs alone.
     pub(super) fn has_paths(&self) -> bool {
         self.targets.iter().all(|target| target.path.is_some())
+    }
+
+    /// RMS of the sideways distances in um, with the tolerances used as far as is given; `None` where the paths are not known without time.
+    pub(super) fn path_left_um(&self, ratio: Option<f64>) -> Option<f64> {
+        let mut machine = self.machine_with(&self.values);
+        if let Some(ratio) = ratio {
+            (machine.smoothing.tolerance_ratio, machine.smoothing.tolerance_reversal_ratio) = (ratio, ratio);
+        }
+        let all = self.has_paths().then(|| self.residuals_of(machine, Aim::Shape)).flatten()?;
+        Some(square(&all).sqrt() * SIDEWAYS_MM.0 / UM_MM)
     }
 
     /// Programs planned until now.
