@@ -191,13 +191,12 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
     if targets.is_empty() { Err(refused("no program is given")) } else { Ok((targets, moved)) }
 }
 
-/// A path that the best corners leave as far off as no rounding at all would: another program.
+/// A path that lies further off than half of all rounding of corners moves it: another program.
 fn another_path(fit: &Fit<'_>) -> Option<Diagnostic> {
-    let left_um = fit.path_left_um(None)?;
-    let unrounded_um = fit.path_left_um(Some(Knob::Ratio.value(f64::NEG_INFINITY)))?;
-    (left_um > ALIKE_UM && left_um > UNROUNDED_SHARE * unrounded_um).then(|| {
+    let (left_um, rounding_um) = fit.path_left_um()?;
+    (left_um > ALIKE_UM && left_um > rounding_um).then(|| {
         refused(&format!(
-            "with the best rounding of corners the paths of trace and program are {left_um:.0} um apart (RMS), without any rounding {unrounded_um:.0} um: \
+            "with the best rounding of corners the paths of trace and program are {left_um:.0} um apart (RMS), half of the rounding moves them by {rounding_um:.0} um: \
              it is the trace of another program, or of other offsets, tools or units"
         ))
     })
@@ -205,8 +204,6 @@ fn another_path(fit: &Fit<'_>) -> Option<Diagnostic> {
 
 /// RMS below which paths are alike whatever rounding explains: five steps of a scale of 1 um.
 const ALIKE_UM: f64 = 5.0;
-/// What the best corners must explain of what rounding does.
-const UNROUNDED_SHARE: f64 = 0.5;
 
 /// An axis that moves less tells nothing.
 const MOVED_MM: f64 = 0.1;

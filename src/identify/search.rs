@@ -88,14 +88,16 @@ impl<'a> Fit<'a> {
         self.targets.iter().all(|target| target.path.is_some())
     }
 
-    /// RMS of the sideways distances in um, with the tolerances used as far as is given; `None` where the paths are not known without time.
-    pub(super) fn path_left_um(&self, ratio: Option<f64>) -> Option<f64> {
-        let mut machine = self.machine_with(&self.values);
-        if let Some(ratio) = ratio {
-            (machine.smoothing.tolerance_ratio, machine.smoothing.tolerance_reversal_ratio) = (ratio, ratio);
-        }
-        let all = self.has_paths().then(|| self.residuals_of(machine, Aim::Shape)).flatten()?;
-        Some(square(&all).sqrt() * SIDEWAYS_MM.0 / UM_MM)
+    /// RMS of the sideways distances in um, and by how much the path moves with half of the tolerances; `None` where the paths are not known without time.
+    pub(super) fn path_left_um(&self) -> Option<(f64, f64)> {
+        let machine = self.machine_with(&self.values);
+        let mut halved = machine.clone();
+        halved.smoothing.tolerance_ratio *= 0.5;
+        halved.smoothing.tolerance_reversal_ratio *= 0.5;
+        let of = |machine: Machine| self.has_paths().then(|| self.residuals_of(machine, Aim::Shape)).flatten();
+        let (left, moved) = (of(machine)?, of(halved)?);
+        let moved: f64 = left.iter().zip(&moved).map(|(a, b)| (a - b) * (a - b)).sum();
+        Some((square(&left).sqrt() * SIDEWAYS_MM.0 / UM_MM, moved.sqrt() * SIDEWAYS_MM.0 / UM_MM))
     }
 
     /// Programs planned until now.
