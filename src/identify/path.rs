@@ -83,7 +83,8 @@ impl PathOfTrace {
             let step_mm = traced_mm - before_mm;
             before_mm = *traced_mm;
             let target: Vec<f64> = point.iter().zip(&shift).map(|(point, shift)| point - shift).collect();
-            let (low, high) = (way_mm, way_mm + 2.0 * step_mm);
+            // Half of the traced way at least: behind a sharp corner the nearest place would otherwise stay in front of it.
+            let (low, high) = (way_mm + 0.5 * step_mm, way_mm + 2.0 * step_mm);
             way_mm += step_mm;
             let mut off = Vec::new();
             for step in 0..=FOOT_STEPS {
