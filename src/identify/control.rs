@@ -9,9 +9,11 @@
 use super::choose::{Search, Window};
 use super::contradict::{contradiction, nothing_fits};
 use super::knobs::{Knob, Switch};
+use super::path::PathOfTrace;
 use super::profile::{PathProfile, linear_axes, shared_axes};
 use super::search::{Aim, Fit, Target, Told};
-use crate::base::units::{MM_PER_M, percent_from_ratio};
+use super::shape::{quick, shape};
+use crate::base::units::{MM_PER_INCH, MM_PER_M, percent_from_ratio};
 use crate::base::{AxisId, Diagnostic};
 use crate::interpreter::Setup;
 use crate::machine::Machine;
@@ -88,16 +90,6 @@ pub struct ControlResult {
     pub plans: usize,
 }
 
-/// Passes of the fit of the shape alone.
-const SHAPE_PASSES: usize = 25;
-/// RMS of the sideways distances in um that is as good as none.
-const SHAPE_NONE_LEFT: f64 = 0.01;
-/// Where else it begins: alpha and the two tolerance ratios.
-const SHAPE_STARTS: [[f64; 3]; 4] = [[2.0, 0.9, 0.9], [1.3, 0.6, 0.6], [3.3, 0.8, 0.8], [2.0, 0.4, 0.4]];
-/// RMS from which it does: end tangents that are too long and a tolerance that is not used to its end leave some tenths of a um.
-const SHAPE_LITTLE_LEFT: f64 = 0.03;
-/// RMS from which another curve is tried.
-const SHAPE_LEFT: f64 = 0.3;
 /// Paths that differ by more than this share of their length are not of one program.
 const LENGTH_SHARE: f64 = 0.03;
 /// And so are paths that lie apart by more than this share of it.
@@ -123,21 +115,25 @@ pub fn calibrate(
         sets: Vec::new(),
         plans: 0,
     };
-    let mut fit = Fit { machine: machine.clone(), targets: &targets, values: Vec::new(), plans: 0 };
+    let mut fit = Fit::new(quick(machine), &targets);
     progress("shape of the corners");
-    let told_shape = shape(&mut fit);
+    let told_shape = shape(&mut fit, progress);
+    fit.machine.feed.time_law = machine.feed.time_law;
+    if let Some(finding) = another_path(&fit) {
+        return Err(finding);
+    }
     let mut search = Search::new(fit, moved, progress).ok_or_else(|| refused(ALARM))?;
     search.run();
     words(&mut result, &mut search, told_shape);
     let knobs = search.knobs();
-    let mut fit = search.fit;
+    let mut fit = search.best.fit;
     take(&mut result, &mut fit, &knobs);
     let after = fit.machine_with(&fit.values);
     sets(&mut result, machine, &after);
-    result.plans = fit.plans;
+    result.plans = fit.plans();
     let (old, new) = (Arc::new(machine.clone()), Arc::new(after));
     for pair in fitted.iter().chain(unseen) {
-        let (target, axes) = target(pair, machine)?;
+        let (target, axes, _) = target(pair, machine)?;
         let one = |machine: &Arc<Machine>| {
             PathProfile::planned(machine, &pair.setup, &axes, target.time_s).ok_or_else(|| refused(ALARM))
         };
@@ -163,12 +159,15 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
     let mut targets = Vec::new();
     let mut moved: Vec<AxisId> = Vec::new();
     for pair in fitted {
-        let (profile, axes) = target(pair, machine)?;
+        let (profile, axes, rows) = target(pair, machine)?;
         let before = PathProfile::planned(&Arc::new(machine.clone()), &pair.setup, &axes, profile.time_s)
             .ok_or_else(|| refused(ALARM))?;
         if (before.length_mm / profile.length_mm - 1.0).abs() > LENGTH_SHARE {
+            let inches = (before.length_mm / profile.length_mm / MM_PER_INCH - 1.0).abs() < LENGTH_SHARE;
+            let hint =
+                if inches { ": the positions of the trace are in inches, say so in its row of units" } else { "" };
             return Err(refused(&format!(
-                "the path of the trace is {:.3} mm long, that of the program {:.3} mm",
+                "the path of the trace is {:.3} mm long, that of the program {:.3} mm{hint}",
                 profile.length_mm, before.length_mm
             )));
         }
@@ -186,53 +185,34 @@ fn targets(fitted: &[TracedProgram<'_>], machine: &Machine) -> Result<(Vec<Targe
                 moved.push(*id);
             }
         }
-        targets.push(Target { profile, setup: pair.setup.clone(), axes });
+        let path = rows.and_then(|rows| PathOfTrace::new(&rows, &pair.setup, machine, &axes));
+        targets.push(Target { profile, path, setup: pair.setup.clone(), axes });
     }
     if targets.is_empty() { Err(refused("no program is given")) } else { Ok((targets, moved)) }
 }
 
+/// A path that lies further off than half of all rounding of corners moves it: another program.
+fn another_path(fit: &Fit<'_>) -> Option<Diagnostic> {
+    let (left_um, rounding_um) = fit.path_left_um()?;
+    (left_um > ALIKE_UM && left_um > rounding_um).then(|| {
+        refused(&format!(
+            "with the best rounding of corners the paths of trace and program are {left_um:.0} um apart (RMS), half of the rounding moves them by {rounding_um:.0} um: \
+             it is the trace of another program, or of other offsets, tools or units"
+        ))
+    })
+}
+
+/// RMS below which paths are alike whatever rounding explains: five steps of a scale of 1 um.
+const ALIKE_UM: f64 = 5.0;
+
 /// An axis that moves less tells nothing.
 const MOVED_MM: f64 = 0.1;
-
-/// Fits the corners, with another curve where much is left over. Returns whether the curve is told.
-fn shape(fit: &mut Fit<'_>) -> bool {
-    let enough = SHAPE_NONE_LEFT * SHAPE_NONE_LEFT;
-    let mut cost = fit.run(&Knob::SHAPE, Aim::Shape, SHAPE_PASSES, enough).unwrap_or(f64::INFINITY);
-    for start in SHAPE_STARTS {
-        if cost.sqrt() < SHAPE_LITTLE_LEFT {
-            break;
-        }
-        let mut trial = fit.clone();
-        trial.values = Knob::SHAPE.into_iter().zip(start).collect();
-        let found = trial.run(&Knob::SHAPE, Aim::Shape, SHAPE_PASSES, enough);
-        fit.plans = trial.plans;
-        if let Some(found) = found.filter(|found| *found < cost) {
-            (*fit, cost) = (trial, found);
-        }
-    }
-    let mut told = true;
-    let others = Switch::Shape.others(&fit.machine);
-    let differences = fit.differences(&others, Aim::Shape);
-    for (other, difference) in others.into_iter().zip(differences) {
-        told &= difference.is_none_or(|square| square > SHAPE_LEFT * SHAPE_LEFT);
-        if cost.sqrt() < SHAPE_LEFT || !told {
-            continue;
-        }
-        let mut trial = Fit { machine: other, values: Vec::new(), ..fit.clone() };
-        let found = trial.run(&Knob::SHAPE, Aim::Shape, SHAPE_PASSES, enough);
-        fit.plans = trial.plans;
-        if let Some(found) = found.filter(|found| *found < 0.5 * cost) {
-            (*fit, cost) = (trial, found);
-        }
-    }
-    told
-}
 
 /// Words and window: what is told, and what is not.
 fn words(result: &mut ControlResult, search: &mut Search<'_, '_>, told_shape: bool) {
     let told = [(Switch::Shape, told_shape)].into_iter().chain(search.told());
     for (switch, told) in told {
-        let word = switch.word(&search.fit.machine);
+        let word = switch.word(&search.best.fit.machine);
         if told {
             result.choices.push((switch.key(), word.to_owned()));
         } else {
@@ -240,7 +220,7 @@ fn words(result: &mut ControlResult, search: &mut Search<'_, '_>, told_shape: bo
             result.refusals.push((switch.key().to_owned(), reason));
         }
     }
-    let blocks = search.fit.machine.look_ahead_blocks;
+    let blocks = search.best.fit.machine.look_ahead_blocks;
     let key = "look_ahead.blocks".to_owned();
     match search.told_window() {
         Window::Between(low, high) => result.estimates.push(ControlEstimate {
@@ -354,17 +334,20 @@ fn refused(reason: &str) -> Diagnostic {
         .help("trace the set-points of the whole program, and give the same program with its zero offsets and tools")
 }
 
-/// What a trace says of its program, and the axes whose path is held against it.
-fn target(pair: &TracedProgram<'_>, machine: &Machine) -> Result<(PathProfile, Vec<AxisId>), Diagnostic> {
+/// What a trace says of its program, the axes whose path is held against it, and their set-points.
+type Traced = (PathProfile, Vec<AxisId>, Option<Vec<Vec<f64>>>);
+
+fn target(pair: &TracedProgram<'_>, machine: &Machine) -> Result<Traced, Diagnostic> {
     let axes = shared_axes(pair.trace, machine);
     let name = &pair.trace.name;
     if axes.len() >= 2 {
-        return PathProfile::of_trace(pair.trace, machine, &axes)
-            .map(|profile| (profile, axes))
+        let rows = PathProfile::rows(pair.trace, machine, &axes);
+        return rows
+            .and_then(|rows| PathProfile::of_rows(&rows).map(|profile| (profile, axes, Some(rows.0))))
             .ok_or_else(|| refused(&format!("the set-points of `{name}` do not move, or have gaps")));
     }
     let count = axes.len();
-    PathProfile::of_feed(pair.trace).map(|profile| (profile, linear_axes(machine))).ok_or_else(|| {
+    PathProfile::of_feed(pair.trace).map(|profile| (profile, linear_axes(machine), None)).ok_or_else(|| {
         refused(&format!(
             "`{name}` has position set-points of {count} linear axes of this machine, and no feed along the path"
         ))

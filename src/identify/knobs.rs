@@ -118,6 +118,12 @@ impl Knob {
         if self.is_share() { (value / (1.0 - value)).ln() } else { value.ln() }
     }
 
+    /// The range of it.
+    pub(super) fn free_range(self) -> (f64, f64) {
+        let (low, high) = self.range();
+        (self.free(low), self.free(high))
+    }
+
     /// And back, into the range.
     pub(super) fn value(self, free: f64) -> f64 {
         let (low, high) = self.range();
@@ -202,6 +208,10 @@ impl Switch {
     /// Those of time.
     pub(super) const TIME: [Self; 6] =
         [Self::TimeLaw, Self::BlendLaw, Self::Limits, Self::CornerRule, Self::CurvatureJump, Self::ArcLimits];
+
+    /// Those of time beside the law.
+    pub(super) const WORDS: [Self; 5] =
+        [Self::BlendLaw, Self::Limits, Self::CornerRule, Self::CurvatureJump, Self::ArcLimits];
 
     pub(super) fn key(self) -> &'static str {
         match self {

@@ -6,8 +6,8 @@
 //! `plausible` and `choice` leave unfit traces out, `normal` solves least squares in blocks (intervals from leaving blocks out), `friction` and `staged` fit the
 //! mechanics, `beyond` looks at what their law does not have, `aliasing`
 //! mends a current that was sampled on its sawtooth, `feedforward` and `speed_loop` the controllers, `refine` simulates the axis itself. `plan` and
-//! `plan_control` write the programs to record. `profile`, `knobs`,
-//! `search`, `choose`, `contradict` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
+//! `plan_control` write the programs to record. `profile`, `path`, `knobs`,
+//! `search`, `shape`, `words`, `choose`, `contradict` and `control` calibrate the control: corner smoothing and time law from the set-points of programs.
 //! Does not tune anything, and takes nothing from a machine file that it says it has identified.
 
 mod aliasing;
@@ -22,6 +22,7 @@ mod friction;
 mod knobs;
 mod motion;
 mod normal;
+mod path;
 mod plan;
 mod plan_control;
 mod plausible;
@@ -29,9 +30,11 @@ mod profile;
 mod record;
 mod refine;
 mod search;
+mod shape;
 mod speed_loop;
 mod staged;
 mod wire;
+mod words;
 mod write;
 
 pub use axis::{IdentifyOptions, identify};

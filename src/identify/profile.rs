@@ -7,10 +7,11 @@
 
 use crate::base::units::mm_s_from_mm_min;
 use crate::base::{AxisId, AxisKind};
+use crate::interpolator::Interpolator;
 use crate::interpreter::{Event, Setup};
-use crate::kernel::{Kernel, Status};
+use crate::kernel::{PieceSource, Preparation};
 use crate::machine::Machine;
-use crate::trace::{Clock, Method, Signal, Trace, TraceEvent};
+use crate::trace::{Clock, Method, Signal, TimeGrid, Trace, TraceEvent};
 use std::sync::Arc;
 
 /// Stretches of a path.
@@ -46,6 +47,16 @@ fn traced_between_s(trace: &Trace) -> Option<[f64; 2]> {
     Some([from_s, of("stop").filter(|to_s| *to_s > from_s).unwrap_or(f64::INFINITY)])
 }
 
+/// Rows are missing: one alone is bridged, more are not.
+fn has_gap(times: &TimeGrid) -> bool {
+    if matches!(times, TimeGrid::Uniform { .. }) {
+        return false;
+    }
+    let all: Vec<f64> = times.iter().collect();
+    let longest_s = all.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    times.period_s().is_some_and(|period_s| longest_s > 2.5 * period_s)
+}
+
 /// A motion on equal stretches of its path.
 #[derive(Clone, Debug)]
 pub(super) struct PathProfile {
@@ -71,13 +82,16 @@ pub(super) fn shared_axes(trace: &Trace, machine: &Machine) -> Vec<AxisId> {
 }
 
 impl PathProfile {
-    /// Of the set-points of a trace; `None` without motion or with gaps.
-    pub(super) fn of_trace(trace: &Trace, machine: &Machine, axes: &[AxisId]) -> Option<Self> {
+    /// Set-points of a trace a period apart, and the period; `None` with gaps.
+    pub(super) fn rows(trace: &Trace, machine: &Machine, axes: &[AxisId]) -> Option<(Vec<Vec<f64>>, f64)> {
         let signals: Option<Vec<&Signal>> =
             axes.iter().map(|id| trace.axis_signal(&machine.axis(*id).name, "position_setpoint")).collect();
         let signals = signals?;
         let grid = &signals.first()?.times;
         let (mut start_s, mut end_s, period_s) = (grid.start_s()?, grid.end_s()?, grid.period_s()?);
+        if has_gap(grid) {
+            return None;
+        }
         if let Some([from_s, to_s]) = traced_between_s(trace) {
             (start_s, end_s) = (start_s.max(from_s), end_s.min(to_s));
         }
@@ -94,7 +108,12 @@ impl PathProfile {
         let places: Vec<Vec<f64>> =
             (0..times.len()).map(|k| columns.iter().map(|column| column[k]).collect()).collect();
         let complete = places.iter().flatten().all(|value| value.is_finite());
-        complete.then(|| Self::of(&places, period_s, 0.0)).flatten()
+        complete.then_some((places, period_s))
+    }
+
+    /// Of the set-points of a trace; `None` without motion.
+    pub(super) fn of_rows((places, period_s): &(Vec<Vec<f64>>, f64)) -> Option<Self> {
+        Self::of(places, *period_s, 0.0)
     }
 
     /// Of the feed along the path of a trace; `None` without it.
@@ -124,19 +143,21 @@ impl PathProfile {
 
     /// Of a program as this machine plans it; `None` after an alarm, and where it goes on for an hour and four times as long as the trace did.
     pub(super) fn planned(machine: &Arc<Machine>, setup: &Setup, axes: &[AxisId], traced_s: f64) -> Option<Self> {
-        let mut kernel = Kernel::new(machine.clone(), setup.clone(), false);
+        // Set-points alone: what a kernel adds to them (tool, drives, rows) takes twice as long as they do.
+        let mut source = Preparation::new(setup.clone(), machine);
+        let mut interpolator = Interpolator::new(machine);
         let period_s = machine.cycle.time_base.seconds(machine.cycle.time_base.ticks_per_setpoint());
         let mut places = Vec::new();
         let (mut feed_sum, mut feed_count) = (0.0, 0.0_f64);
         // Until the program says otherwise all of it is.
         let mut traced = true;
-        let cycles_max = ((ENDLESS_S + 4.0 * traced_s) / period_s) as usize;
+        let cycles_max = ((ENDLESS_S + 4.0 * traced_s) / period_s) as u64;
         for cycle in 0.. {
             if cycle > cycles_max || places.len() > SETPOINTS_MAX {
                 return None;
             }
-            let status = kernel.cycle().ok()?;
-            for event in kernel.output().begun.iter().flat_map(|begun| &begun.events) {
+            let setpoint = interpolator.sample(cycle, &mut || source.next_piece());
+            for event in interpolator.begun().iter().flat_map(|begun| &begun.events) {
                 let Event::Trace(starts) = event else { continue };
                 if *starts {
                     places.clear();
@@ -144,22 +165,17 @@ impl PathProfile {
                 }
                 traced = *starts;
             }
-            if !traced {
-                if status == Status::Finished {
-                    break;
-                }
-                continue;
-            }
-            if let Some(setpoint) = kernel.output().setpoint {
+            let Some(setpoint) = setpoint else { break };
+            if traced {
                 places.push(axes.iter().map(|id| setpoint.axes[*id].position_lu).collect());
                 if let (Some(feed), false) = (setpoint.path.programmed_feed_lu_s, setpoint.path.rotary_only) {
                     feed_sum += feed;
                     feed_count += 1.0;
                 }
             }
-            if status == Status::Finished {
-                break;
-            }
+        }
+        if source.take_findings().alarm.is_some() {
+            return None;
         }
         Self::of(&places, period_s, feed_sum / feed_count.max(1.0))
     }

@@ -6,6 +6,7 @@
 //! stays there. Columns of differences are planned side by side. Does not choose words.
 
 use super::knobs::Knob;
+use super::path::PathOfTrace;
 use super::profile::{CELLS, PathProfile};
 use crate::base::AxisId;
 use crate::interpreter::Setup;
@@ -13,10 +14,13 @@ use crate::machine::Machine;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A traced program.
 pub(super) struct Target {
     pub(super) profile: PathProfile,
+    /// Its set-points beside the path; `None` where that cannot be had without time.
+    pub(super) path: Option<PathOfTrace>,
     pub(super) setup: Setup,
     pub(super) axes: Vec<AxisId>,
 }
@@ -36,9 +40,10 @@ const STEPS: [f64; 3] = [0.02, 0.06, 0.007];
 /// The same for what is told: wide enough to see where a limit ceases to hold.
 const SIDE_STEP: f64 = 0.1;
 /// Longest step of a free number in one pass: the law is bent.
-const STEP_MAX: f64 = 0.8;
+pub(super) const STEP_MAX: f64 = 0.8;
 /// Sideways distances are counted in this: alone, and beside ln(feed): 1 um there is as much as 1 % of feed.
 const SIDEWAYS_MM: (f64, f64) = (1e-3, 0.1);
+const UM_MM: f64 = 1e-3;
 /// Pull to where a knob began, in RMS of ln(feed) for a free number that is off by 1.
 const PULL: f64 = 2e-4;
 /// Share of the mean feed below which feeds count as alike: the ends of a motion are no matter of ratios.
@@ -67,10 +72,39 @@ pub(super) struct Fit<'a> {
     pub(super) targets: &'a [Target],
     /// Values of all knobs that have been moved.
     pub(super) values: Vec<(Knob, f64)>,
-    pub(super) plans: usize,
+    /// Differences of feed beyond the grain count by their logarithm: a few stretches that are far off do not hold the others.
+    pub(super) by_logarithm: bool,
+    /// Programs planned, by this fit and by those cloned from it.
+    pub(super) plans: Arc<AtomicUsize>,
 }
 
-impl Fit<'_> {
+impl<'a> Fit<'a> {
+    pub(super) fn new(machine: Machine, targets: &'a [Target]) -> Self {
+        Self { machine, targets, values: Vec::new(), by_logarithm: false, plans: Arc::default() }
+    }
+
+    /// The shape of the corners is told by the paths of all programs alone.
+    pub(super) fn has_paths(&self) -> bool {
+        self.targets.iter().all(|target| target.path.is_some())
+    }
+
+    /// RMS of the sideways distances in um, and by how much the path moves with half of the tolerances; `None` where the paths are not known without time.
+    pub(super) fn path_left_um(&self) -> Option<(f64, f64)> {
+        let machine = self.machine_with(&self.values);
+        let mut halved = machine.clone();
+        halved.smoothing.tolerance_ratio *= 0.5;
+        halved.smoothing.tolerance_reversal_ratio *= 0.5;
+        let of = |machine: Machine| self.has_paths().then(|| self.residuals_of(machine, Aim::Shape)).flatten();
+        let (left, moved) = (of(machine)?, of(halved)?);
+        let moved: f64 = left.iter().zip(&moved).map(|(a, b)| (a - b) * (a - b)).sum();
+        Some((square(&left).sqrt() * SIDEWAYS_MM.0 / UM_MM, moved.sqrt() * SIDEWAYS_MM.0 / UM_MM))
+    }
+
+    /// Programs planned until now.
+    pub(super) fn plans(&self) -> usize {
+        self.plans.load(Ordering::Relaxed)
+    }
+
     pub(super) fn machine_with(&self, values: &[(Knob, f64)]) -> Machine {
         let mut machine = self.machine.clone();
         for (knob, value) in values {
@@ -97,12 +131,18 @@ impl Fit<'_> {
         let mut all = Vec::new();
         let share = 1.0 / (self.targets.len() as f64).sqrt();
         for target in self.targets {
+            if let (Aim::Shape, Some(path)) = (aim, &target.path) {
+                all.extend(path.off_mm(&machine)?.iter().map(|off| off * share / SIDEWAYS_MM.0));
+                continue;
+            }
+            self.plans.fetch_add(1, Ordering::Relaxed);
             let planned = PathProfile::planned(&machine, &target.setup, &target.axes, target.profile.time_s)?;
             if aim == Aim::Both {
                 let floor = FLOOR_SHARE * target.profile.feeds_mm_s.iter().sum::<f64>() / CELLS as f64;
                 let weight = share / (CELLS as f64).sqrt();
                 let feeds = planned.feeds_mm_s.iter().zip(&target.profile.feeds_mm_s);
-                all.extend(feeds.map(|(a, b)| weight * ((a + floor) / (b + floor)).ln()));
+                let counts = |off: f64| if self.by_logarithm { GRAIN * (off / GRAIN).asinh() } else { off };
+                all.extend(feeds.map(|(a, b)| weight * counts(((a + floor) / (b + floor)).ln())));
                 all.push(share * (planned.time_s / target.profile.time_s).ln());
             }
             let unit_mm = if aim == Aim::Both { SIDEWAYS_MM.1 } else { SIDEWAYS_MM.0 };
@@ -112,13 +152,12 @@ impl Fit<'_> {
         all.iter().all(|r| r.is_finite()).then_some(all)
     }
 
-    fn residuals(&self, values: &[(Knob, f64)], aim: Aim) -> Option<Vec<f64>> {
+    pub(super) fn residuals(&self, values: &[(Knob, f64)], aim: Aim) -> Option<Vec<f64>> {
         self.residuals_of(self.machine_with(values), aim)
     }
 
     /// Cost at the present values on other machines, planned side by side.
-    pub(super) fn costs(&mut self, machines: &[Machine], aim: Aim) -> Vec<Option<f64>> {
-        self.plans += machines.len() * self.targets.len();
+    pub(super) fn costs(&self, machines: &[Machine], aim: Aim) -> Vec<Option<f64>> {
         let with_values = |machine: &Machine| {
             let mut machine = machine.clone();
             self.values.iter().for_each(|(knob, value)| knob.set(&mut machine, *value));
@@ -128,20 +167,27 @@ impl Fit<'_> {
     }
 
     /// Mean squares of what machines with other words do otherwise, at the present values; `None` after an alarm.
-    pub(super) fn differences(&mut self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
-        self.plans += (others.len() + 1) * self.targets.len();
-        let Some(base) = self.residuals(&self.values, aim) else { return vec![None; others.len()] };
-        let difference = |other: &Machine| {
+    pub(super) fn differences(&self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
+        let with_values = |other: &Machine| {
             let mut machine = other.clone();
             self.values.iter().for_each(|(knob, value)| knob.set(&mut machine, *value));
-            let moved = self.residuals_of(machine, aim)?;
+            machine
+        };
+        self.differences_of(&others.iter().map(with_values).collect::<Vec<_>>(), aim)
+    }
+
+    /// The same of machines as they are.
+    pub(super) fn differences_of(&self, others: &[Machine], aim: Aim) -> Vec<Option<f64>> {
+        let Some(base) = self.residuals(&self.values, aim) else { return vec![None; others.len()] };
+        let difference = |machine: &Machine| {
+            let moved = self.residuals_of(machine.clone(), aim)?;
             Some(base.iter().zip(&moved).map(|(a, b)| (a - b) * (a - b)).sum())
         };
         others.par_iter().map(difference).collect()
     }
 
     /// Columns d residuals / d free number.
-    fn columns(&mut self, base: &[f64], knobs: &[Knob], aim: Aim, wide: f64) -> Vec<Option<Vec<f64>>> {
+    fn columns(&self, base: &[f64], knobs: &[Knob], aim: Aim, wide: f64) -> Vec<Option<Vec<f64>>> {
         let step = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
             // Towards the middle of the range where there is an end of it within the step.
@@ -154,13 +200,12 @@ impl Fit<'_> {
 
     /// The same with given steps; `None` for a knob that stands at an end of its range, and after an alarm.
     fn slopes(
-        &mut self,
+        &self,
         base: &[f64],
         knobs: &[Knob],
         aim: Aim,
         step: impl Fn(&Knob) -> f64 + Sync,
     ) -> Vec<Option<Vec<f64>>> {
-        self.plans += knobs.len() * self.targets.len();
         let column = |knob: &Knob| {
             let now = knob.free(self.value(*knob));
             let moved = knob.value(now + step(knob));
@@ -175,15 +220,13 @@ impl Fit<'_> {
     }
 
     /// Cost at the present values.
-    pub(super) fn cost(&mut self, aim: Aim) -> Option<f64> {
-        self.plans += self.targets.len();
+    pub(super) fn cost(&self, aim: Aim) -> Option<f64> {
         self.residuals(&self.values, aim).map(|residuals| square(&residuals))
     }
 
     /// Turns `knobs` until the cost is least, or below `enough`. Returns it, without the pull. Columns are planned where they must be, and between two
     /// such passes carried on by what each step shows (Broyden): a step costs a plan or two instead of one a knob.
     pub(super) fn run(&mut self, knobs: &[Knob], aim: Aim, passes: usize, enough: f64) -> Option<f64> {
-        self.plans += self.targets.len();
         let origin: Vec<f64> = knobs.iter().map(|knob| knob.free(knob.get(&self.machine))).collect();
         let pull = |free: &[f64]| free.iter().zip(&origin).map(|(f, o)| (PULL * (f - o)).powi(2)).sum::<f64>();
         let mut free: Vec<f64> = knobs.iter().map(|knob| knob.free(self.value(*knob))).collect();
@@ -236,7 +279,7 @@ impl Fit<'_> {
 
     /// The better of two steps of unlike damping, with more of it until one helps: values, residuals, free numbers, and the damping from here on.
     fn step(
-        &mut self,
+        &self,
         knobs: &[Knob],
         aim: Aim,
         columns: &[Option<Vec<f64>>],
@@ -256,23 +299,20 @@ impl Fit<'_> {
             let residuals = self.residuals(&values, aim)?;
             Some((square(&residuals) + pull(&free), (values, residuals, free, damping)))
         };
-        let (mut damping, mut tries, mut plans) = (damping, if fresh { TRIES } else { 1 }, 0);
+        let (mut damping, mut tries) = (damping, if fresh { TRIES } else { 1 });
         let mut found = None;
         while found.is_none() && tries > 0 && damping < DAMPING.2 {
-            plans += 2 * self.targets.len();
             let both: Vec<Option<(f64, Step)>> = [damping, damping * WORSE].par_iter().map(|d| trial(*d)).collect();
             let best = both.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
             found = best.filter(|(cost, _)| *cost < at.before).map(|(_, step)| step);
             damping *= WORSE * WORSE;
             tries -= 1;
         }
-        self.plans += plans;
         found.map(|(values, residuals, free, used)| (values, residuals, free, (used * BETTER).max(DAMPING.1)))
     }
 
     /// What the motion tells about each knob at the present values, below them and above; `None` after an alarm.
-    pub(super) fn told(&mut self, knobs: &[Knob], aim: Aim) -> Option<[Told; 2]> {
-        self.plans += self.targets.len();
+    pub(super) fn told(&self, knobs: &[Knob], aim: Aim) -> Option<[Told; 2]> {
         let base = self.residuals(&self.values, aim)?;
         let left = square(&base).sqrt().hypot(GRAIN);
         let mut sides = Vec::new();

@@ -159,6 +159,25 @@ const CASES: &[Case] = &[
         ],
     },
     Case {
+        name: "quintic",
+        sets: &[
+            "smoothing.shape=quintic",
+            "smoothing.alpha=2.0",
+            "smoothing.tolerance_ratio=0.9",
+            "smoothing.radial_jerk_share=0.35",
+        ],
+    },
+    Case {
+        name: "modern",
+        sets: &[
+            "smoothing.shape=quintic",
+            "feed.time_law=continuous",
+            "look_ahead.blocks=100",
+            "axes.X.transition_jerk_max_m_s3=25",
+            "axes.Y.transition_jerk_max_m_s3=20",
+        ],
+    },
+    Case {
         name: "everything",
         sets: &[
             "feed.time_law=continuous",
@@ -392,6 +411,22 @@ fn the_file_of_another_machine_is_refused_with_advice() {
     let finding = calibrate(std::slice::from_ref(&pair), &[], &start, &mut progress()).expect_err("another feed");
     assert_eq!(finding.code, "T0208");
     assert!(finding.render(false).contains("override"), "{finding:?}");
+}
+
+/// As long as the other path, and never further from it than a tenth of a millimetre or two: only the corners tell.
+#[test]
+fn a_trace_of_a_program_that_differs_by_a_little_is_refused() {
+    let start = machine("spinner_mvc850", &[]);
+    let trace = traced(&start, QUICK);
+    for (from, to) in [("X13 Y5", "X13.2 Y5"), ("Y9\nX-2", "Y9.15\nX-2")] {
+        let other = QUICK.replace(from, to);
+        assert_ne!(other, QUICK);
+        let pair = TracedProgram { trace: &trace, setup: setup(&other) };
+        let found = calibrate(std::slice::from_ref(&pair), &[], &start, &mut |_| {});
+        let finding = found.err().unwrap_or_else(|| panic!("{to} was taken for {from}"));
+        assert_eq!(finding.code, "T0208");
+        assert!(finding.message.contains("another program"), "{finding:?}");
+    }
 }
 
 #[test]

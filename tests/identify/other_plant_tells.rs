@@ -60,10 +60,9 @@ fn given(result: &AxisResult, parameter: Parameter) -> Estimate {
     *result.estimate(parameter).unwrap_or_else(|| panic!("{parameter:?}: {:?}", result.refusal(parameter)))
 }
 
-/// The interval holds the truth; one in twenty may miss it, by next to nothing.
+/// The interval holds the truth.
 fn holds(estimate: &Estimate, truth: f64) {
-    let room = 0.005 * truth.abs();
-    assert!((estimate.low - room..=estimate.high + room).contains(&truth), "{estimate:?} without {truth}");
+    assert!((estimate.low..=estimate.high).contains(&truth), "{estimate:?} without {truth}");
 }
 
 #[test]
@@ -179,18 +178,24 @@ fn traces_of_it_are_fitted_together_and_unfit_ones_left_out() {
         assert!(alone.refusal(Parameter::Coulomb).is_some(), "{:?}", alone.estimate(Parameter::Coulomb));
     }
     let honest = |result: &AxisResult| {
+        // Of four intervals of 95 % one may miss (two do in 1.4 % of cases); a miss lies within that of 99.7 %, half as wide again.
+        let mut missed = 0;
         for (parameter, truth) in [
             (Parameter::Inertia, plant.inertia),
             (Parameter::Viscous, plant.viscous),
             (Parameter::Coulomb, plant.coulomb),
             (Parameter::Gravity, plant.gravity),
         ] {
-            if let Some(estimate) = result.estimate(parameter) {
-                holds(estimate, truth);
+            let Some(estimate) = result.estimate(parameter) else { continue };
+            if !(estimate.low..=estimate.high).contains(&truth) {
+                let more = 0.25 * (estimate.high - estimate.low);
+                holds(&Estimate { low: estimate.low - more, high: estimate.high + more, ..*estimate }, truth);
+                missed += 1;
             }
         }
         given(result, Parameter::Inertia);
         given(result, Parameter::Gravity);
+        assert!(missed <= 1, "{result:?}");
     };
     honest(&found(&both, FILE));
     // With a current of another sign beside them, and one without a current.
