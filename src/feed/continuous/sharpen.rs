@@ -30,7 +30,8 @@ const SHORTEST_S: f64 = 4e-5;
 
 /// Where so much of the time hangs on the limits of one interval, if they were wider by 1, it is put in parts once whatever first order says: its profile may
 /// be the best of its kind, and another kind faster that only shorter intervals can follow. Counted is this share of it. Again it is put in parts where what
-/// hangs on it is this many times its own time: a place through which all before and after it must pass. Where one limit holds a whole path it is
+/// hangs on it is this many times its own time: a place through which all before and after it must pass; but not in a plan after which another one
+/// looks further. Where one limit holds a whole path it is
 /// between a third (jerk) and a half (acceleration) of it.
 const HEAVY_PRICE: f64 = 0.003;
 const HEAVY_SHARE: f64 = 0.1;
@@ -108,7 +109,8 @@ impl Continuous {
                 slower(interval, &pieces[owners[index]])
             };
             let mut cost = prices.unused + prices.limits * tighter + prices.cap * slower;
-            let is_narrow = || prices.limits > NARROW_RATIO * profile.interval_s(chain, index) / whole_s;
+            let is_narrow =
+                || self.planning.is_last && prices.limits > NARROW_RATIO * profile.interval_s(chain, index) / whole_s;
             if prices.limits > HEAVY_PRICE && (first || is_narrow()) {
                 cost = cost.max(HEAVY_SHARE * prices.limits);
             }
