@@ -10,6 +10,7 @@ use super::choose::{Search, Window};
 use super::contradict::{contradiction, nothing_fits};
 use super::knobs::{Knob, Switch};
 use super::path::PathOfTrace;
+use super::plausible::other_kind;
 use super::profile::{PathProfile, linear_axes, shared_axes};
 use super::search::{Aim, Fit, Target, Told};
 use super::shape::{quick, shape};
@@ -340,6 +341,12 @@ type Traced = (PathProfile, Vec<AxisId>, Option<Vec<Vec<f64>>>);
 fn target(pair: &TracedProgram<'_>, machine: &Machine) -> Result<Traced, Diagnostic> {
     let axes = shared_axes(pair.trace, machine);
     let name = &pair.trace.name;
+    for axis in axes.iter().map(|id| machine.axis(*id)) {
+        let signal = pair.trace.axis_signal(&axis.name, "position_setpoint");
+        if let Some(refused) = signal.and_then(|signal| other_kind(pair.trace, signal, axis)) {
+            return Err(refused);
+        }
+    }
     if axes.len() >= 2 {
         let rows = PathProfile::rows(pair.trace, machine, &axes);
         return rows

@@ -6,9 +6,10 @@
 
 use super::record::AxisRecord;
 use super::wire::{AxisResult, Estimate, Parameter};
-use crate::base::AxisKind;
 use crate::base::units::{deg_from_rad, mm_from_inch, mm_min_from_mm_s};
+use crate::base::{AxisKind, Diagnostic};
 use crate::machine::{Axis, DriveData, DynamicsMode};
+use crate::trace::{Signal, Trace};
 
 /// Beyond this many times what the machine file allows, no tolerance of a machine file is meant. Every unit that is taken for another is further off.
 const FAR_RATIO: f64 = 3.0;
@@ -23,6 +24,23 @@ const INCH_SHARE: f64 = 0.1;
 
 /// What to do.
 pub(super) const UNITS: &str = "check that the trace is of this axis (--axis-name), in mm or deg, s, A and N m (a row of units, or --map, tells others), and that -m is its machine";
+
+/// A signal of lengths in the unit of the other kind of axis: its numbers mean something else.
+pub(super) fn other_kind(trace: &Trace, signal: &Signal, axis: &Axis) -> Option<Diagnostic> {
+    let is_angle = signal.unit.starts_with("deg");
+    let is_way = signal.unit.starts_with("mm");
+    let (kind, right) = match axis.kind {
+        AxisKind::Linear if is_angle => ("linear", "mm"),
+        AxisKind::Rotary if is_way => ("rotary", "deg"),
+        _ => return None,
+    };
+    let [name, original, unit] = [&trace.name, &signal.original, &signal.unit];
+    let message = format!("`{name}`: `{original}` is in {unit}, and {} is a {kind} axis of this machine", axis.name);
+    let help = format!(
+        "if the numbers are in {right}, name the column so (--map); else give the axis its name (--axis-name) or the machine of the trace (-m)"
+    );
+    Some(Diagnostic::error("T0209", message).help(help))
+}
 
 /// What a record contradicts.
 pub(super) fn contradiction(record: &AxisRecord, axis: &Axis, data: &DriveData) -> Option<String> {

@@ -4,6 +4,7 @@
 //! that. A signal that is not there is `None`, a value that is not there NaN. Does not filter. Rows of a faster trace are taken at the position
 //! ticks, its current is averaged over each position cycle.
 
+use super::plausible::other_kind;
 use super::wire::TorqueSource;
 use crate::base::units::rad_from_deg;
 use crate::base::{AxisKind, Diagnostic};
@@ -196,6 +197,11 @@ pub(super) fn read(
     cycle_s: f64,
 ) -> Result<Option<AxisRecord>, Diagnostic> {
     let Some(signal) = timed(trace, axis) else { return Ok(None) };
+    let lengths = ["position_setpoint", "position_measured", "position_actual", "following_error"];
+    let other = lengths.iter().filter_map(|stem| trace.axis_signal(&axis.name, stem));
+    if let Some(refused) = other.filter_map(|signal| other_kind(trace, signal, axis)).next() {
+        return Err(refused);
+    }
     let grid = &signal.times;
     let (Some(start_s), Some(end_s), Some(period_s)) = (grid.start_s(), grid.end_s(), grid.period_s()) else {
         return Ok(None);

@@ -75,6 +75,15 @@ fn bad_input_is_refused_with_what_to_do() {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("nothing could be identified") && text.contains("record the position"), "{text}");
+    // Degrees of linear axes are nothing to read as millimetres.
+    let degrees = "time_s,X.position_setpoint_deg,Y.position_setpoint_deg\n0,0,0\n0.001,0.1,0.1\n0.002,0.2,0.1\n";
+    std::fs::write(folder.join("degrees.csv"), degrees).expect("a file");
+    for call in [&["identify", "degrees.csv"][..], &["identify", "--smoothing", "degrees.csv", "good.mpf"]] {
+        let output = sollwert(&folder, call);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(matches!(output.status.code(), Some(1 | 2)), "{call:?}: {:?} {errors}", output.status.code());
+        assert!(errors.contains("T0209") && errors.contains("X is a linear axis"), "{call:?}: {errors}");
+    }
     for call in [
         &["identify", "empty.csv"][..],
         &["identify", "missing.mcap"],
