@@ -170,7 +170,7 @@ fn control_document(result: &ControlResult, files: &[String], loaded: &Loaded) -
 }
 
 pub(super) fn control_text(result: &ControlResult, files: &[String]) -> String {
-    let mut rows = vec![["setting", "value", "95 %: from", "to", ""].map(str::to_owned).to_vec()];
+    let mut rows = vec![["setting", "value", "as good: from", "to", ""].map(str::to_owned).to_vec()];
     rows.extend(result.estimates.iter().map(|e| {
         let number = |value: f64| format!("{value:.4}");
         vec![e.key.clone(), number(e.value), number(e.low), number(e.high), e.title.to_owned()]

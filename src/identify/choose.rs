@@ -52,6 +52,24 @@ pub(super) struct Candidate<'a> {
     pub(super) other_words: usize,
 }
 
+/// The last window that holds, from one that does on along some others and between the last two of them; whether there is one that does not.
+fn last_of(from: usize, along: impl Iterator<Item = usize>, holds: impl Fn(usize) -> bool) -> (usize, bool) {
+    let mut good = from;
+    for blocks in along {
+        if holds(blocks) {
+            good = blocks;
+            continue;
+        }
+        let mut bad = blocks;
+        while good.abs_diff(bad) > 1 {
+            let middle = good.midpoint(bad);
+            *(if holds(middle) { &mut good } else { &mut bad }) = middle;
+        }
+        return (good, true);
+    }
+    (good, false)
+}
+
 fn other_law(law: TimeLawKind) -> TimeLawKind {
     match law {
         TimeLawKind::SevenPhase => TimeLawKind::Continuous,
@@ -334,11 +352,11 @@ impl<'a, 'b> Search<'a, 'b> {
         let limit = 1.05 * self.best.cost + DIFFERS * DIFFERS;
         let of = |blocks: usize| costs_of(&self.best.fit, &[blocks]).iter().any(|(_, cost)| *cost < limit);
         let below = (1..now).rev().take(1).chain(WINDOWS.into_iter().rev().filter(|blocks| blocks + 1 < now));
-        let low = below.take_while(|blocks| of(*blocks)).last().unwrap_or(now);
-        match (of(most), of(now + 1)) {
-            (true, _) => Window::AtLeast(low),
-            (false, true) => Window::Between(low, now + 1),
-            (false, false) => Window::Between(low, now),
+        let above = [now + 1].into_iter().chain(WINDOWS.into_iter().filter(|blocks| *blocks > now + 1));
+        let (low, _) = last_of(now, below, of);
+        match last_of(now, above.chain((most > WINDOWS[WINDOWS.len() - 1]).then_some(most)), of) {
+            (_, false) => Window::AtLeast(low),
+            (high, true) => Window::Between(low, high),
         }
     }
 

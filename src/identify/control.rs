@@ -1,6 +1,6 @@
 //! The control as a whole: corner smoothing and time law, from the set-points of programs on traces.
 //!
-//! In: traces and their programs, the machine; pairs not used for the fit. Out: [`ControlResult`]: keys of the machine file with 95 % intervals, words,
+//! In: traces and their programs, the machine; pairs not used for the fit. Out: [`ControlResult`]: keys of the machine file, each with the range of what is as good, words,
 //! and how well cycle time, feed and path agree before and after, on the programs of the fit and on the others. The programs are planned here
 //! again and again: first the shape of the corners (alpha, tolerance ratios, curve) is fitted to the path alone, then with it what is left open about time
 //! (radial shares, transition jerk and jerk of each axis, corner rule with its step, look-ahead window, time law) to the feed along it. Does not touch
