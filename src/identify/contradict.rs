@@ -21,6 +21,8 @@ const BEND_RATIO: f64 = 1e-3;
 const PATH_SHARE: f64 = 0.02;
 const ALIKE_SHARE: f64 = 0.8;
 const RATIO_OFF: (f64, f64) = (0.01, 0.03);
+/// Ratios that an override makes; 1 ms for 1 s is a thousandth.
+const OVERRIDES: std::ops::RangeInclusive<f64> = 0.005..=2.05;
 /// What may be left over of the fitted programs: more is another machine, or another program.
 const FEED_LEFT_SHARE: f64 = 0.1;
 const TIME_LEFT_SHARE: f64 = 0.05;
@@ -78,6 +80,11 @@ fn other_feed(traced: &PathProfile, planned: &PathProfile) -> Option<String> {
     let told = (ratio - 1.0).abs() > RATIO_OFF.1 && alike as f64 > ALIKE_SHARE * ratios.len() as f64;
     told.then(|| {
         let percent = percent_from_ratio(ratio);
+        if !OVERRIDES.contains(&ratio) {
+            return format!(
+                "on straight lines the trace goes on at {percent:.3} % of the programmed feed, which no override makes: its times are not in s, or its positions not in mm (--time NAME:SECONDS tells another unit of time)"
+            );
+        }
         format!("on straight lines the trace goes on at {percent:.1} % of the programmed feed, as an override makes it")
     })
 }

@@ -413,6 +413,24 @@ fn the_file_of_another_machine_is_refused_with_advice() {
     assert!(finding.render(false).contains("override"), "{finding:?}");
 }
 
+/// Times a thousand times too long are no override.
+#[test]
+fn times_in_another_unit_are_said_to_be_that() {
+    let start = machine("spinner_mvc850", &[]);
+    let mut trace = traced(&start, FITTED);
+    for signal in &mut trace.signals {
+        signal.times = match &signal.times {
+            TimeGrid::Uniform { start_ns, step_ns, count } => {
+                TimeGrid::Uniform { start_ns: 1e3 * start_ns, step_ns: 1e3 * step_ns, count: *count }
+            }
+            TimeGrid::Explicit(times) => TimeGrid::Explicit(times.iter().map(|time_s| 1e3 * time_s).collect()),
+        };
+    }
+    let pair = TracedProgram { trace: &trace, setup: setup(FITTED) };
+    let finding = calibrate(std::slice::from_ref(&pair), &[], &start, &mut |_| {}).expect_err("another unit");
+    assert!(finding.message.contains("times are not in s"), "{finding:?}");
+}
+
 /// As long as the other path, and never further from it than a tenth of a millimetre or two: only the corners tell.
 #[test]
 fn a_trace_of_a_program_that_differs_by_a_little_is_refused() {
