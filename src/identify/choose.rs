@@ -6,11 +6,12 @@
 //! One word at a time would not do: two that are wrong together hide each other, and numbers that were fitted to a wrong word are no place to begin from.
 
 use super::knobs::{Knob, Switch};
-use super::search::{Aim, Fit};
+use super::search::{Aim, Fit, STEP_MAX};
 use super::words::tournament;
 use crate::base::AxisId;
 use crate::base::units::percent_from_ratio;
 use crate::machine::{CornerRule, Machine, TimeLawKind};
+use rayon::prelude::*;
 
 /// Steps of a fit at most: in a round of words, and to its end.
 pub(super) const PASSES: (usize, usize) = (3, 40);
@@ -263,6 +264,9 @@ impl<'a, 'b> Search<'a, 'b> {
     /// tell it alone), then the window.
     fn fitted(&mut self, of: &mut Candidate<'a>) {
         let words = &of.fit.machine.clone();
+        if self.few_numbers(of) {
+            return;
+        }
         of.run(&knobs_of_time(words, None), 2 * PASSES.0);
         let shape = if of.fit.has_paths() { &[][..] } else { &Knob::SHAPE };
         let all: Vec<Knob> = shape.iter().copied().chain(knobs_of_time(words, Some(&self.axes))).collect();
@@ -279,6 +283,45 @@ impl<'a, 'b> Search<'a, 'b> {
         of.run(&all, passes);
         self.around(of, &all);
         self.windows_beside(of, &all);
+    }
+
+    /// Few numbers first, those of the axes as in the file: a share and the jerks that it is a share of make up for each other, so that where the share alone
+    /// explains everything, other jerks would explain it almost as well. True: next to nothing is left over.
+    fn few_numbers(&mut self, of: &mut Candidate<'a>) -> bool {
+        // Its numbers are those of the axes.
+        if of.is_continuous() {
+            return false;
+        }
+        self.tell("few numbers", of);
+        let knobs = knobs_of_time(&of.fit.machine.clone(), Some(&[]));
+        let Some(mut few) = self.from_shares(of) else { return false };
+        few.run(&knobs, PASSES.1);
+        let explains = few.done();
+        if explains {
+            *of = few;
+        }
+        explains
+    }
+
+    /// The shares across the path that leave the least over, of a grid over their ranges.
+    fn from_shares(&self, of: &Candidate<'a>) -> Option<Candidate<'a>> {
+        let grid = |knob: Knob| {
+            let (low, high) = knob.free_range();
+            let parts = ((high - low) / STEP_MAX).ceil().max(1.0);
+            (0..=parts as usize).map(move |k| knob.value(low + (high - low) * k as f64 / parts))
+        };
+        let pairs: Vec<(f64, f64)> = grid(Knob::RadialAcceleration)
+            .flat_map(|acceleration| grid(Knob::RadialJerk).map(move |jerk| (acceleration, jerk)))
+            .collect();
+        let begun = pairs.into_par_iter().filter_map(|(acceleration, jerk)| {
+            let mut fit = of.fit.clone();
+            fit.values.retain(|(knob, _)| !matches!(knob, Knob::RadialAcceleration | Knob::RadialJerk));
+            fit.values.extend([(Knob::RadialAcceleration, acceleration), (Knob::RadialJerk, jerk)]);
+            let cost = fit.cost(Aim::Both)?;
+            Some(Candidate { fit, cost, other_words: of.other_words })
+        });
+        let begun: Vec<Candidate<'a>> = begun.collect();
+        begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// Where a fit stands in a bend of limits that take turns, the stretches that are explained already lead on: those that are far off count little for a while.
