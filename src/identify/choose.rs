@@ -132,6 +132,27 @@ impl<'a> Candidate<'a> {
     }
 }
 
+/// The shares across the path that leave the least over, of a grid over their ranges.
+fn begun_at_shares<'a>(of: &Candidate<'a>) -> Option<Candidate<'a>> {
+    let grid = |knob: Knob| {
+        let (low, high) = knob.free_range();
+        let parts = ((high - low) / STEP_MAX).ceil().max(1.0);
+        (0..=parts as usize).map(move |k| knob.value(low + (high - low) * k as f64 / parts))
+    };
+    let pairs: Vec<(f64, f64)> = grid(Knob::RadialAcceleration)
+        .flat_map(|acceleration| grid(Knob::RadialJerk).map(move |jerk| (acceleration, jerk)))
+        .collect();
+    let begun = pairs.into_par_iter().filter_map(|(acceleration, jerk)| {
+        let mut fit = of.fit.clone();
+        fit.values.retain(|(knob, _)| !matches!(knob, Knob::RadialAcceleration | Knob::RadialJerk));
+        fit.values.extend([(Knob::RadialAcceleration, acceleration), (Knob::RadialJerk, jerk)]);
+        let cost = fit.cost(Aim::Both)?;
+        Some(Candidate { fit, cost, other_words: of.other_words })
+    });
+    let begun: Vec<Candidate<'a>> = begun.collect();
+    begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
 /// Knobs of time under the words of `machine`: one jerk for all axes, or one for each of `axes`.
 pub(super) fn knobs_of_time(machine: &Machine, axes: Option<&[AxisId]>) -> Vec<Knob> {
     let mut knobs = Vec::new();
@@ -294,34 +315,13 @@ impl<'a, 'b> Search<'a, 'b> {
         }
         self.tell("few numbers", of);
         let knobs = knobs_of_time(&of.fit.machine.clone(), Some(&[]));
-        let Some(mut few) = self.from_shares(of) else { return false };
+        let Some(mut few) = begun_at_shares(of) else { return false };
         few.run(&knobs, PASSES.1);
         let explains = few.done();
         if explains {
             *of = few;
         }
         explains
-    }
-
-    /// The shares across the path that leave the least over, of a grid over their ranges.
-    fn from_shares(&self, of: &Candidate<'a>) -> Option<Candidate<'a>> {
-        let grid = |knob: Knob| {
-            let (low, high) = knob.free_range();
-            let parts = ((high - low) / STEP_MAX).ceil().max(1.0);
-            (0..=parts as usize).map(move |k| knob.value(low + (high - low) * k as f64 / parts))
-        };
-        let pairs: Vec<(f64, f64)> = grid(Knob::RadialAcceleration)
-            .flat_map(|acceleration| grid(Knob::RadialJerk).map(move |jerk| (acceleration, jerk)))
-            .collect();
-        let begun = pairs.into_par_iter().filter_map(|(acceleration, jerk)| {
-            let mut fit = of.fit.clone();
-            fit.values.retain(|(knob, _)| !matches!(knob, Knob::RadialAcceleration | Knob::RadialJerk));
-            fit.values.extend([(Knob::RadialAcceleration, acceleration), (Knob::RadialJerk, jerk)]);
-            let cost = fit.cost(Aim::Both)?;
-            Some(Candidate { fit, cost, other_words: of.other_words })
-        });
-        let begun: Vec<Candidate<'a>> = begun.collect();
-        begun.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// Where a fit stands in a bend of limits that take turns, the stretches that are explained already lead on: those that are far off count little for a while.
