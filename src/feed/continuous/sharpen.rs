@@ -31,8 +31,7 @@ const SHORTEST_S: f64 = 4e-5;
 /// Where so much of the time hangs on the limits of one interval, if they were wider by 1, it is put in parts once whatever first order says: its profile may
 /// be the best of its kind, and another kind faster that only shorter intervals can follow. Counted is this share of it. Again it is put in parts where what
 /// hangs on it is this many times its own time: a place through which all before and after it must pass; but not in a plan after which another one
-/// looks further. Where one limit holds a whole path it is
-/// between a third (jerk) and a half (acceleration) of it.
+/// looks further. Where one limit holds a whole path it is between a third (jerk) and a half (acceleration) of it.
 const HEAVY_PRICE: f64 = 0.003;
 const HEAVY_SHARE: f64 = 0.1;
 const NARROW_RATIO: f64 = 5.0;
