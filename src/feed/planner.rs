@@ -11,7 +11,7 @@
 //! Where drives are simulated, block ends wait for the axes: nothing beyond such an end is planned before its wait is told
 //! ([`Planner::tell_waited`]), so that all times here are those of the run. Does not sample, and does not know axes: `limits` and `junction` do.
 
-use super::continuous::{Continuous, Flow};
+use super::continuous::{Continuous, Flowing};
 use super::feed_override::{OverrideCourse, OverrideSchedule};
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
@@ -137,7 +137,7 @@ enum Motion {
         block_length_lu: Option<f64>,
     },
     /// Along a curve, under the law `continuous`.
-    Flows(Box<Flow>),
+    Flows(Flowing),
     /// Stands still for a time.
     Waits { time_s: f64 },
     /// Stands still until these axes have arrived.
@@ -274,10 +274,10 @@ impl Planner {
                     .as_ref()
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
                 if flows {
-                    let flow = Flow::new(rules.clone(), &path, blend, [&ends.start, &ends.end]);
+                    let flow = Flowing::new(rules.clone(), &path, blend, [&ends.start, &ends.end]);
                     check_flow(&flow, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
                     self.last = Some((ends, rules));
-                    Motion::Flows(Box::new(flow))
+                    Motion::Flows(flow)
                 } else {
                     let limits = rules.piece(contour, curve, &ends, worst.as_ref());
                     check_motion(&limits, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;

@@ -17,21 +17,19 @@ pub const DISPLACEMENT_MIN_LU: f64 = 1e-9;
 
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
-// A contour holds curves in a queue of a few dozen: a box would cost an allocation a block and save nothing that counts.
-#[allow(clippy::large_enum_variant)]
 pub enum Curve {
-    /// Straight in all axes.
+    /// Straight in all axes; dense programs have nothing else, and it is moved a lot: what is larger has a place of its own.
     Line(Line),
     /// Circle or helix.
-    Arc(Arc),
+    Arc(Box<Arc>),
     /// Circle or helix in a plane that no two axes span.
-    SpatialArc(SpatialArc),
+    SpatialArc(Box<SpatialArc>),
     /// Spline or polynomial.
-    Polynomial(PolynomialCurve),
+    Polynomial(Box<PolynomialCurve>),
     /// Corner blend, the published cubic.
-    Blend(HermiteBlend),
+    Blend(Box<HermiteBlend>),
     /// Corner blend without a step of curvature.
-    Quintic(QuinticBlend),
+    Quintic(Box<QuinticBlend>),
 }
 
 /// A curve at one place, with derivatives to s (lu per mm, per mm², per mm³; per rad where only rotary axes move).
@@ -45,6 +43,42 @@ pub struct CurveState {
     pub second: AxisVector,
     /// q'''(s).
     pub third: AxisVector,
+}
+
+impl From<Line> for Curve {
+    fn from(line: Line) -> Self {
+        Self::Line(line)
+    }
+}
+
+impl From<Arc> for Curve {
+    fn from(arc: Arc) -> Self {
+        Self::Arc(Box::new(arc))
+    }
+}
+
+impl From<SpatialArc> for Curve {
+    fn from(arc: SpatialArc) -> Self {
+        Self::SpatialArc(Box::new(arc))
+    }
+}
+
+impl From<PolynomialCurve> for Curve {
+    fn from(curve: PolynomialCurve) -> Self {
+        Self::Polynomial(Box::new(curve))
+    }
+}
+
+impl From<HermiteBlend> for Curve {
+    fn from(blend: HermiteBlend) -> Self {
+        Self::Blend(Box::new(blend))
+    }
+}
+
+impl From<QuinticBlend> for Curve {
+    fn from(blend: QuinticBlend) -> Self {
+        Self::Quintic(Box::new(blend))
+    }
 }
 
 impl Curve {
@@ -118,11 +152,11 @@ impl Curve {
         }
         match self {
             Self::Line(line) => Self::Line(line.shortened(start_lu, length_lu - end_lu)),
-            Self::Arc(arc) => Self::Arc(arc.trimmed(start_lu, end_lu)),
-            Self::SpatialArc(arc) => Self::SpatialArc(arc.trimmed(start_lu, end_lu)),
-            Self::Polynomial(curve) => Self::Polynomial(curve.trimmed(start_lu, end_lu)),
-            Self::Blend(blend) => Self::Blend(blend.trimmed(start_lu, end_lu)),
-            Self::Quintic(blend) => Self::Quintic(blend.trimmed(start_lu, end_lu)),
+            Self::Arc(arc) => arc.trimmed(start_lu, end_lu).into(),
+            Self::SpatialArc(arc) => arc.trimmed(start_lu, end_lu).into(),
+            Self::Polynomial(curve) => curve.trimmed(start_lu, end_lu).into(),
+            Self::Blend(blend) => blend.trimmed(start_lu, end_lu).into(),
+            Self::Quintic(blend) => blend.trimmed(start_lu, end_lu).into(),
         }
     }
 }

@@ -204,7 +204,7 @@ impl Rules {
         let Some(blend) = HermiteBlend::new(lines[0].end(), &u, &v, t, alpha) else { return Junction::Pass };
         // Of the clamped T, so that the tolerance only gets smaller.
         let tolerance_mm = 0.25 * t * (4.0 - alpha) * (joint.angle_rad / 2.0).portable_sin();
-        joint.blended(Curve::Blend(blend), tolerance_mm, t)
+        joint.blended(Curve::from(blend), tolerance_mm, t)
     }
 
     /// The blend without a step of curvature, rotary axes along.
@@ -227,7 +227,7 @@ impl Rules {
         let t = joint.room.clamped(wanted_lu);
         let blend = shape.blend(lines[0].end(), t)?;
         // Of the clamped T, so that the tolerance only gets smaller.
-        Some(joint.blended(Curve::Quintic(blend), t * shape.deviation_ratio(), t))
+        Some(joint.blended(Curve::from(blend), t * shape.deviation_ratio(), t))
     }
 
     /// G644: as far as the axes need, as their tolerances allow.

@@ -179,11 +179,11 @@ impl Basis {
     ) -> Curve {
         if !self.tilted {
             let geometry = ArcGeometry { plane: self.axes, centre_mm, radius_mm, sweep_rad };
-            return Curve::Arc(Arc::new(start, end, &geometry, linear));
+            return Curve::from(Arc::new(start, end, &geometry, linear));
         }
         let centre_mm = self.directions[0] * centre_mm[0] + self.directions[1] * centre_mm[1];
         let geometry = SpatialArcGeometry { directions: self.directions, centre_mm, radius_mm, sweep_rad };
-        Curve::SpatialArc(SpatialArc::new(start, end, &geometry, linear))
+        Curve::from(SpatialArc::new(start, end, &geometry, linear))
     }
 }
 

@@ -118,15 +118,15 @@ impl Smoother {
             }
             MoveKind::Arc(geometry) => {
                 let arc = Arc::new(self.position, next.end, geometry, linear);
-                self.push_motion(next, Curve::Arc(arc), out);
+                self.push_motion(next, Curve::from(arc), out);
             }
             MoveKind::SpatialArc(geometry) => {
                 let arc = SpatialArc::new(self.position, next.end, geometry, linear);
-                self.push_motion(next, Curve::SpatialArc(arc), out);
+                self.push_motion(next, Curve::from(arc), out);
             }
             MoveKind::Spline(geometry) | MoveKind::Polynomial(geometry) => {
                 let curve = PolynomialCurve::new(self.position, next.end, geometry, linear);
-                self.push_motion(next, Curve::Polynomial(curve), out);
+                self.push_motion(next, Curve::from(curve), out);
             }
             MoveKind::Dwell { time_s } => {
                 let time_s = *time_s;
@@ -348,8 +348,8 @@ impl Smoother {
                     head.events = before.head.events.clone();
                     head.blocks_begun = before.head.blocks_begun;
                     match blend {
-                        Curve::Blend(blend) => Curve::Blend(blend.starting_at(start)),
-                        Curve::Quintic(blend) => Curve::Quintic(blend.starting_at(start)),
+                        Curve::Blend(blend) => Curve::from(blend.starting_at(start)),
+                        Curve::Quintic(blend) => Curve::from(blend.starting_at(start)),
                         other => other,
                     }
                 };

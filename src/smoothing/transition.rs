@@ -246,7 +246,7 @@ fn joined(reach: PerAxis<f64>, near_lu: f64) -> PerAxis<f64> {
 
 fn chained(pieces: Vec<PolynomialPiece>, [start, end]: [PartPoint; 2], linear: &PerAxis<bool>) -> Option<Curve> {
     let curve = PolynomialCurve::new(start, end, &Arc::new(PolynomialGeometry { pieces }), linear);
-    (curve.length_lu() > 0.0).then_some(Curve::Polynomial(curve))
+    (curve.length_lu() > 0.0).then_some(Curve::from(curve))
 }
 
 /// A polynomial, not divided.

@@ -152,7 +152,7 @@ fn blends(planned: &[PlannedPiece]) -> Vec<(&PlannedPiece, &HermiteBlend)> {
     let pieces = planned.iter().filter(|piece| blend(piece) && shape(piece));
     pieces
         .map(|piece| match piece.path.contour.curve() {
-            Some(Curve::Blend(blend)) => (piece, blend),
+            Some(Curve::Blend(blend)) => (piece, &**blend),
             _ => unreachable!(),
         })
         .collect()

@@ -171,7 +171,7 @@ fn arcs_and_helices_are_measured_by_their_positions() {
         let start = PartPoint(vector(&[from[0], from[1], 0.0, 0.0]));
         let end = PartPoint(vector(&[to[0], to[1], pitch, turn_c]));
         let geometry = ArcGeometry { plane, centre_mm: [0.0; 2], radius_mm: radius, sweep_rad: sweep };
-        let arc = Curve::Arc(Arc::new(start, end, &geometry, &linear()));
+        let arc = Curve::from(Arc::new(start, end, &geometry, &linear()));
         // The same circle turned about X.
         let (sin, cos) = f64::sin_cos(0.6);
         let directions = [vector(&[1.0]), vector(&[0.0, cos, sin])];
@@ -180,7 +180,7 @@ fn arcs_and_helices_are_measured_by_their_positions() {
         let geometry =
             SpatialArcGeometry { directions, centre_mm: AxisVector::zero(), radius_mm: radius, sweep_rad: sweep };
         let (start, end) = (PartPoint(place(from, 0.0)), PartPoint(place(to, pitch)));
-        let tilted = Curve::SpatialArc(SpatialArc::new(start, end, &geometry, &linear()));
+        let tilted = Curve::from(SpatialArc::new(start, end, &geometry, &linear()));
         for curve in [arc, tilted] {
             for [a, b] in [[0.0, 1.0], [0.2, 0.7]] {
                 let [from, to] = [a, b].map(|share| share * curve.length_lu());

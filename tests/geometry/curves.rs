@@ -137,13 +137,13 @@ fn check_derivatives(curve: &Curve, step: f64, tolerance: f64, what: &str) {
 #[test]
 fn derivatives_agree_with_finite_differences() {
     for degrees in [0.5, 20.0, 60.0, 90.0, 130.0] {
-        let curve = Curve::Blend(blend(f64::to_radians(degrees), 1.0, 2.5));
+        let curve = Curve::from(blend(f64::to_radians(degrees), 1.0, 2.5));
         check_derivatives(&curve, 1e-5, 1e-4, &format!("blend {degrees} deg"));
     }
     let helix = ArcGeometry { plane: [X, Y], centre_mm: [1.0, 2.0], radius_mm: 5.0, sweep_rad: -4.0 };
     let end = point(&[1.0 + 5.0 * f64::cos(-4.0), 2.0 + 5.0 * f64::sin(-4.0), 3.0, 0.4]);
     let arc = Arc::new(point(&[6.0, 2.0, 0.0, 0.0]), end, &helix, &linear());
-    check_derivatives(&Curve::Arc(arc), 1e-4, 1e-7, "helix");
+    check_derivatives(&Curve::from(arc), 1e-4, 1e-7, "helix");
     let line = Line::new(point(&[1.0, 2.0, 3.0, 4.0]), point(&[-3.0, 5.0, 9.0, 4.5]), &linear());
     check_derivatives(&Curve::Line(line), 1e-4, 1e-9, "line");
 }
@@ -213,8 +213,8 @@ fn ends_are_exact_and_parts_fit() {
     let half = ArcGeometry { plane: [X, Y], centre_mm: [5.2, -3.75], radius_mm: radius, sweep_rad: PI };
     let curves = [
         Curve::Line(Line::new(start, end, &linear())),
-        Curve::Arc(Arc::new(start, end, &half, &linear())),
-        Curve::Blend(blend(1.2, 0.3, 2.5)),
+        Curve::from(Arc::new(start, end, &half, &linear())),
+        Curve::from(blend(1.2, 0.3, 2.5)),
     ];
     for curve in &curves {
         let length = curve.length_lu();
@@ -289,7 +289,7 @@ fn arc_meets_ends_that_miss_the_circle() {
     let step = arc.length_lu() * 1e-9;
     let jump = (end.0 - arc.at(arc.length_lu() - step).position.0).norm();
     close(jump, step, 1e-12, "no jump at the end");
-    check_derivatives(&Curve::Arc(arc), 1e-4, 1e-7, "arc beside its circle");
+    check_derivatives(&Curve::from(arc), 1e-4, 1e-7, "arc beside its circle");
 }
 
 #[test]
@@ -318,12 +318,12 @@ fn degenerate_input_gives_no_nan() {
         Curve::Line(Line::new(here, tiny, &linear())),
         Curve::Line(Line::new(point(&[0.0]), point(&[1e-300]), &linear())),
         Curve::Line(Line::new(point(&[-1e300]), point(&[1e300, 1e300]), &linear())),
-        Curve::Arc(Arc::new(here, here, &dot, &linear())),
-        Curve::Arc(Arc::new(here, here, &ArcGeometry { sweep_rad: TAU, ..dot }, &linear())),
-        Curve::Arc(Arc::new(here, point(&[1.0, 2.0, 9.0, 4.0]), &dot, &linear())),
-        Curve::Arc(Arc::new(here, point(&[1.0, 2.0, 3.0, 5.0]), &dot, &linear())),
-        Curve::Blend(blend(1e-6, 1e-9, 2.5)),
-        Curve::Blend(blend(PI - 1e-6, 1e6, 2.5)),
+        Curve::from(Arc::new(here, here, &dot, &linear())),
+        Curve::from(Arc::new(here, here, &ArcGeometry { sweep_rad: TAU, ..dot }, &linear())),
+        Curve::from(Arc::new(here, point(&[1.0, 2.0, 9.0, 4.0]), &dot, &linear())),
+        Curve::from(Arc::new(here, point(&[1.0, 2.0, 3.0, 5.0]), &dot, &linear())),
+        Curve::from(blend(1e-6, 1e-9, 2.5)),
+        Curve::from(blend(PI - 1e-6, 1e6, 2.5)),
     ];
     for curve in &curves {
         let length = curve.length_lu();

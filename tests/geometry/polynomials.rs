@@ -162,7 +162,7 @@ fn derivatives_are_those_of_the_positions() {
 fn parts_are_the_whole_between_their_ends() {
     let rows: [&[f64]; 4] =
         [&[0.0, 1.0, 2.0, 0.1], &[10.0, 0.0, 3.0, 0.2], &[0.0, 8.0, 0.0, 0.0], &[-3.0, 1.0, 1.0, 0.3]];
-    let whole = Curve::Polynomial(curve(vec![piece(1.5, &rows, ONE)]));
+    let whole = Curve::from(curve(vec![piece(1.5, &rows, ONE)]));
     let length = whole.length_lu();
     for (from, to) in [(0.0, 0.4), (0.2, 0.9), (0.5, 1.0), (0.123, 0.124)] {
         let part = whole.trimmed(from * length, to * length).trimmed(0.0, f64::INFINITY);
@@ -200,7 +200,7 @@ fn a_cusp_is_a_break_and_has_numbers_beside_it() {
         }
         close(state.first.norm(), 1.0, 1e-9, "unit speed");
     }
-    let whole = Curve::Polynomial(cusp);
+    let whole = Curve::from(cusp);
     let (left, right) = (whole.trimmed(0.0, breaks[0]), whole.trimmed(breaks[0], f64::INFINITY));
     let (into, out_of) = (left.at(f64::INFINITY).first, right.at(0.0).first);
     assert!((into + out_of).norm() < 0.01, "the direction turns round: {into:?} {out_of:?}");
@@ -255,7 +255,7 @@ fn what_does_not_move_or_is_no_curve_is_told_by_its_length() {
         let curve = curve(pieces);
         assert!(!curve.length_lu().is_finite(), "case {case}: {}", curve.length_lu());
         for s in [0.0, 1.0, f64::NAN, f64::INFINITY] {
-            let _ = Curve::Polynomial(curve.clone()).trimmed(s, 2.0).at(s);
+            let _ = Curve::from(curve.clone()).trimmed(s, 2.0).at(s);
         }
     }
 }
@@ -281,7 +281,7 @@ fn an_arc_in_any_plane_is_the_turned_circle() {
         assert!((at.position.0 - expected(share)).norm() < 1e-12, "{share}");
     }
     check_derivatives(&|s| arc.at(s), arc.length_lu(), "spatial arc");
-    let whole = Curve::SpatialArc(arc);
+    let whole = Curve::from(arc);
     let part = whole.trimmed(4.0, 21.0);
     for s in [0.0, 3.0, 17.0] {
         assert!((part.at(s).position.0 - whole.at(4.0 + s).position.0).norm() < 1e-12);

@@ -135,7 +135,7 @@ fn ends_have_no_curvature_and_derivatives_are_differences() {
         }
         assert_eq!(blend.at(0.0).position, blend.start());
         assert_eq!(blend.at(f64::INFINITY).position, blend.end());
-        let (step, curve) = (1e-4 * length, Curve::Quintic(blend));
+        let (step, curve) = (1e-4 * length, Curve::from(blend));
         for i in 1..50 {
             let s = length * f64::from(i) / 50.0;
             let (before, here, after) = (curve.at(s - step), curve.at(s), curve.at(s + step));
@@ -179,7 +179,7 @@ fn a_blend_in_space_carries_rotary_axes_in_proportion() {
 
 #[test]
 fn parts_are_the_whole() {
-    let whole = Curve::Quintic(blend(1.9, 0.4));
+    let whole = Curve::from(blend(1.9, 0.4));
     let length = whole.length_lu();
     let part = whole.trimmed(0.2 * length, 0.9 * length).trimmed(0.1 * length, 0.6 * length);
     close(part.length_lu(), 0.5 * length, 1e-15, "length");

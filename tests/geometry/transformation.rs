@@ -76,7 +76,7 @@ fn random_curve(random: &mut Random) -> Curve {
     end.0[x] = centre_mm[0] + dx * cos - dy * sin;
     end.0[y] = centre_mm[1] + dx * sin + dy * cos;
     let arc = ArcGeometry { plane: [x, y], centre_mm, radius_mm: dx.hypot(dy), sweep_rad };
-    Curve::Arc(sollwert::geometry::Arc::new(start, end, &arc, &linear()))
+    Curve::from(sollwert::geometry::Arc::new(start, end, &arc, &linear()))
 }
 
 #[test]

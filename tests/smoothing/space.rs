@@ -94,9 +94,9 @@ fn programmed(moves: &[Move]) -> Vec<Curve> {
             let (start, end) = (from, moved.end);
             from = end;
             match &moved.kind {
-                MoveKind::Arc(geometry) => Curve::Arc(CircularArc::new(start, end, geometry, &linear)),
-                MoveKind::SpatialArc(geometry) => Curve::SpatialArc(SpatialArc::new(start, end, geometry, &linear)),
-                MoveKind::Spline(geometry) => Curve::Polynomial(PolynomialCurve::new(start, end, geometry, &linear)),
+                MoveKind::Arc(geometry) => Curve::from(CircularArc::new(start, end, geometry, &linear)),
+                MoveKind::SpatialArc(geometry) => Curve::from(SpatialArc::new(start, end, geometry, &linear)),
+                MoveKind::Spline(geometry) => Curve::from(PolynomialCurve::new(start, end, geometry, &linear)),
                 _ => Curve::Line(Line::new(start, end, &linear)),
             }
         })

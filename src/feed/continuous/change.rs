@@ -12,7 +12,7 @@ use super::grid::{Grid, Settling, Stretch};
 use super::interval::{Interval, Tangent};
 use super::layout::Layout;
 use super::regime::rapids;
-use super::{Continuous, Piece, look};
+use super::{Continuous, Piece, Sight, look};
 use crate::feed::PathState;
 use crate::feed::ramp::Dynamics;
 
@@ -166,7 +166,7 @@ impl Continuous {
             front.flow.grid = None;
         }
         if !self.is_held(&pieces[0]) {
-            self.plan(pieces);
+            self.plan(pieces, Sight::All);
         }
     }
 
@@ -174,7 +174,7 @@ impl Continuous {
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
         let before = self.regime.move_to(override_ratio);
         let Expected { way_lu: guess_lu, landing_lu } = self.expect(pieces, start, false);
-        let count = self.reach(pieces, 0, start).usual;
+        let count = self.usual_reach(pieces, start);
         let layout = self.layout(pieces, count, 0, start);
         let pieces = &pieces[..count];
         let rests = pieces.last().is_some_and(|last| last.rests_after);
@@ -214,13 +214,13 @@ impl Continuous {
                 pieces[0].flow.grid = None;
             }
             let rested = std::mem::replace(&mut pieces[rapids - 1].rests_after, true);
-            if self.lay(&mut pieces[..rapids]) {
+            if self.lay(&mut pieces[..rapids], Sight::All).unwrap_or(false) {
                 return true;
             }
             pieces[rapids - 1].rests_after = rested;
         }
         let (guess_lu, most_lu) = (self.expect(pieces, start, true).way_lu, self.way_left_lu());
-        let count = self.reach(pieces, 0, start).usual;
+        let count = self.usual_reach(pieces, start);
         let pieces = &mut pieces[..count];
         let found = shortest(guess_lu, most_lu, |way_lu, longer| {
             let (layout, count) = self.layout_to_stop(pieces, start, way_lu);

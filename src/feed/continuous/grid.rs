@@ -163,17 +163,21 @@ pub(super) fn constant_speed_lu_s(rules: &AxisRules, path: &JointPath, state: &D
     speed_lu_s
 }
 
-/// About the highest speeds at both ends of a piece: from its slow places on they grow with constant jerk.
-pub(super) fn end_speeds_lu_s(rules: &AxisRules, path: &JointPath) -> [f64; 2] {
+/// About the highest speeds at both ends of a piece that begins with `start`: from its slow places on they grow with constant jerk. `places_lu_s`: the
+/// highest constant ones there.
+pub(super) fn end_speeds_lu_s(
+    rules: &AxisRules,
+    path: &JointPath,
+    start: Derivatives,
+    places_lu_s: [f64; 2],
+) -> [f64; 2] {
+    if path.is_straight() {
+        return places_lu_s;
+    }
     let rules = rules.throughout(path);
     let length_lu = path.length_lu();
-    let state_at = |s_lu: f64| Derivatives::from(path.at(s_lu));
-    let speed_at = |s_lu: f64| constant_speed_lu_s(rules, path, &state_at(s_lu));
-    if path.is_straight() {
-        return [speed_at(0.0); 2];
-    }
-    let mut ends_lu_s = [speed_at(0.0), speed_at(length_lu)];
-    let start = state_at(0.0);
+    let speed_at = |s_lu: f64| constant_speed_lu_s(rules, path, &Derivatives::from(path.at(s_lu)));
+    let mut ends_lu_s = places_lu_s;
     let jerk = rules.largest(|axis, limits| start.first[axis].abs() / limits.jerk_max_lu_s3);
     let jerk_lu_s3 = if rules.jerk_limited { 1.0 / jerk.demand_ratio } else { f64::INFINITY };
     for share in SLOW_PLACES_SHARE {

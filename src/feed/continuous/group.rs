@@ -29,7 +29,7 @@ const CAP_ROUNDING_RATIO: f64 = 1e-9;
 const FITTING_MIN_RATIO: f64 = 1.0 / 1024.0;
 
 /// Pieces before and after one that are looked at for slow places near it.
-const NEAR_PIECES: usize = 16;
+pub(super) const NEAR_PIECES: usize = 16;
 
 /// Pieces of one interval at most.
 const PIECES_MAX: usize = 64;
@@ -61,13 +61,20 @@ impl Stretch {
 }
 
 impl Brief {
-    /// The piece, if it is smooth and takes no longer than an interval may; `ends`: its first and last derivatives.
-    pub fn new(rules: &AxisRules, path: &JointPath, tangent: &Tangent, ends: [Derivatives; 2]) -> Option<Self> {
+    /// The piece, if it is smooth and takes no longer than an interval may; `ends`: its first and last derivatives, `places_lu_s`: the highest constant
+    /// speeds there.
+    pub fn new(
+        rules: &AxisRules,
+        path: &JointPath,
+        tangent: &Tangent,
+        ends: [Derivatives; 2],
+        places_lu_s: [f64; 2],
+    ) -> Option<Self> {
         let curve = path.contour.curve().filter(|_| path.is_contour())?;
         let length_lu = path.length_lu();
         let rules = rules.throughout(path);
         let speed_at = |state: &Derivatives| constant_speed_lu_s(rules, path, state);
-        let mut speed_lu_s = speed_at(&ends[0]);
+        let mut speed_lu_s = places_lu_s[0];
         let fits = |speed_lu_s: f64| length_lu <= speed_lu_s * tangent.step_s;
         let straight = matches!(curve, Curve::Line(_));
         let bounds = Arc::new(Bounds::new(rules, false));
@@ -77,7 +84,7 @@ impl Brief {
                 Curve::Polynomial(curve) => curve.knots_lu().next().is_none(),
                 _ => true,
             };
-            speed_lu_s = speed_lu_s.min(speed_at(&ends[1]));
+            speed_lu_s = speed_lu_s.min(places_lu_s[1]);
             if !one_piece || !fits(speed_lu_s) {
                 return None;
             }

@@ -32,7 +32,7 @@ use crate::kinematics::{JointPath, JointState};
 use chain::{Chain, PathPoint, Planning, Profile, Start};
 pub(super) use change::Change;
 use grid::{End, Grid};
-use group::{Brief, Stretch};
+use group::{Brief, NEAR_PIECES, Stretch};
 use interval::{Derivatives, Tangent};
 use layout::{Layout, Place};
 use regime::Regime;
@@ -52,6 +52,9 @@ const WHOLE_INTERVALS_MAX: f64 = 2000.0;
 
 /// A grid for an end about which nothing was known yet serves an end that is slower, down to this share.
 const SLOWER_RATIO: f64 = 0.8;
+
+/// So many pieces more than the plan before looked at are in sight of a plan at first.
+const MORE_PIECES: usize = 2 * NEAR_PIECES;
 
 /// Places nearer to each other than this share of an interval are one.
 const SAME_PLACE_RATIO: f64 = 1e-9;
@@ -74,6 +77,30 @@ pub(super) struct Flow {
     brief: Option<Box<Brief>>,
     grid: Option<Grid>,
 }
+
+/// A piece that moves, before a plan looks at it. Most of a long window waits long for that: what a plan needs is made when it gets there.
+#[derive(Clone, Debug)]
+pub(super) struct Flowing {
+    rules: Arc<AxisRules>,
+    blend: bool,
+    /// Highest constant speeds at its ends, of these places alone.
+    places_lu_s: [f64; 2],
+    flow: Option<Box<Flow>>,
+}
+
+/// What of the window a plan is given: its pieces in order, without what does not move, up to a rest at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Sight {
+    All,
+    /// The first ones of them only; `rests`: the path rests somewhere in the window.
+    Part {
+        rests: bool,
+    },
+}
+
+/// The part of the window that a plan was given ends before what it needs.
+#[derive(Clone, Copy, Debug)]
+struct TooShort;
 
 /// How many pieces of the window a plan reaches.
 struct Reach {
@@ -123,17 +150,55 @@ pub(super) struct Continuous {
     refuge: Option<TimeLaw>,
     /// The feed override, and where the front piece stands under it.
     regime: Regime,
+    /// How many pieces the last plan looked at.
+    looked_at: usize,
+}
+
+impl Flowing {
+    /// Its curve has no step of direction or curvature inside. `ends`: the states there.
+    pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool, ends: [&JointState; 2]) -> Self {
+        let places_lu_s = place_speeds_lu_s(&rules, path, ends);
+        Self { rules, blend, places_lu_s, flow: None }
+    }
+
+    /// Highest constant speeds at its ends; not positive or no number: nothing can move there.
+    pub fn ends_lu_s(&self) -> [f64; 2] {
+        self.places_lu_s
+    }
+
+    /// As plans need it.
+    pub fn look(&mut self, path: &JointPath) -> &mut Flow {
+        let Self { rules, blend, places_lu_s, flow } = self;
+        flow.get_or_insert_with(|| {
+            let ends = [path.at(0.0), path.at(path.length_lu())];
+            Box::new(Flow::new(rules.clone(), path, *blend, ends.each_ref(), *places_lu_s))
+        })
+    }
+}
+
+/// Highest constant speeds at the ends of a piece.
+fn place_speeds_lu_s(rules: &AxisRules, path: &JointPath, ends: [&JointState; 2]) -> [f64; 2] {
+    let rules = rules.throughout(path);
+    let speed_at = |state: &JointState| grid::constant_speed_lu_s(rules, path, &Derivatives::from(*state));
+    let first_lu_s = speed_at(ends[0]);
+    [first_lu_s, if path.is_straight() { first_lu_s } else { speed_at(ends[1]) }]
 }
 
 impl Flow {
-    /// A piece that moves; its curve has no step of direction or curvature inside. `ends`: the states there.
-    pub fn new(rules: Arc<AxisRules>, path: &JointPath, blend: bool, ends: [&JointState; 2]) -> Self {
+    /// `places_lu_s`: the highest constant speeds at its ends.
+    fn new(
+        rules: Arc<AxisRules>,
+        path: &JointPath,
+        blend: bool,
+        ends: [&JointState; 2],
+        places_lu_s: [f64; 2],
+    ) -> Self {
         let ends = ends.map(|state| Derivatives::from(*state));
         let tangent = Tangent::between(rules.throughout(path), blend, [&ends[0].first, &ends[1].first]);
-        let brief = if blend { None } else { Brief::new(&rules, path, &tangent, ends).map(Box::new) };
+        let brief = if blend { None } else { Brief::new(&rules, path, &tangent, ends, places_lu_s).map(Box::new) };
         let ends_lu_s = match &brief {
             Some(brief) => [brief.speed_lu_s; 2],
-            None => grid::end_speeds_lu_s(&rules, path),
+            None => grid::end_speeds_lu_s(&rules, path, ends[0], places_lu_s),
         };
         let (override_ratio, fastest_ratio) = (1.0, 1.0);
         Self {
@@ -149,15 +214,11 @@ impl Flow {
         }
     }
 
-    /// Highest constant speeds at its ends; not positive or no number: nothing can move there.
-    pub fn ends_lu_s(&self) -> [f64; 2] {
-        self.ends_lu_s
-    }
-
     /// The same under other rules.
     fn follow(&mut self, rules: Arc<AxisRules>, path: &JointPath) {
         let ends = [path.at(0.0), path.at(path.length_lu())];
-        let new = Self::new(rules, path, self.blend, ends.each_ref());
+        let places_lu_s = place_speeds_lu_s(&rules, path, ends.each_ref());
+        let new = Self::new(rules, path, self.blend, ends.each_ref(), places_lu_s);
         let Self { override_ratio, fastest_ratio, .. } = *self;
         *self = Self { programmed: self.programmed.clone(), override_ratio, fastest_ratio, ..new };
     }
@@ -175,44 +236,56 @@ impl Continuous {
         self.places.front().is_some_and(|place| place.intervals.end <= self.kept)
     }
 
-    /// Plans again from the start of the front piece. `pieces`: the window in order, without what does not move, up to a rest at most.
-    pub fn plan(&mut self, pieces: &mut [Piece<'_>]) {
+    /// How many pieces of the window the next plan will probably look at, at least; a plan for an override of 0 % must know all.
+    pub fn looks_at(&self) -> usize {
+        if self.override_ratio() == 0.0 { usize::MAX } else { self.looked_at.max(self.places.len()) + MORE_PIECES }
+    }
+
+    /// Plans again from the start of the front piece; false: it must see more of the window.
+    pub fn plan(&mut self, pieces: &mut [Piece<'_>], sight: Sight) -> bool {
         let pieces = self.regime.allowed(pieces);
-        if self.lay(pieces) {
-            return;
+        match self.lay(pieces, sight) {
+            Ok(true) => {}
+            Ok(false) => {
+                // What was planned before still stands, to its end.
+                self.kept = self.chain.intervals.len();
+                if self.places.is_empty() {
+                    self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
+                }
+            }
+            Err(TooShort) => return false,
         }
-        // What was planned before still stands, to its end.
-        self.kept = self.chain.intervals.len();
-        if self.places.is_empty() {
-            self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
-        }
+        true
     }
 
     /// A new plan, if there is one.
-    fn lay(&mut self, pieces: &mut [Piece<'_>]) -> bool {
+    fn lay(&mut self, pieces: &mut [Piece<'_>], sight: Sight) -> Result<bool, TooShort> {
         // From inside the front everything is cut again.
         let (changes, all) = (self.regime.point.is_some(), self.places.len());
+        if sight != Sight::All && pieces.len() <= all {
+            return Err(TooShort);
+        }
         let known = if changes { 0 } else { self.known() };
-        if self.lay_after(pieces, known) {
-            return true;
+        if self.lay_after(pieces, sight, known)? {
+            return Ok(true);
         }
         // What is left of the plan before is a way that keeps every limit, but not on every other grid: so on its own.
-        !changes && known < all && all < pieces.len() && self.lay_after(pieces, all)
+        Ok(!changes && known < all && all < pieces.len() && self.lay_after(pieces, sight, all)?)
     }
 
     /// A new plan in which the first `known` pieces are cut as before.
-    fn lay_after(&mut self, pieces: &mut [Piece<'_>], known: usize) -> bool {
+    fn lay_after(&mut self, pieces: &mut [Piece<'_>], sight: Sight, known: usize) -> Result<bool, TooShort> {
         let start = self.start();
         let known = known.min(pieces.len().saturating_sub(1));
-        let Reach { usual, whole } = self.reach(pieces, known, start);
+        let Reach { usual, whole } = self.reach(pieces, sight, known, start)?;
         self.usual_only &= start != Start::Rest;
         if whole > usual && !self.usual_only {
             if self.lay_so_far(pieces, known, whole) {
-                return true;
+                return Ok(true);
             }
             self.usual_only = true;
         }
-        self.lay_so_far(pieces, known, usual)
+        Ok(self.lay_so_far(pieces, known, usual))
     }
 
     /// A new plan of the first `count` pieces.
@@ -384,11 +457,19 @@ impl Continuous {
     }
 
     /// How far a plan reaches; pieces that are no intervals by themselves get their grids. The first `known` ones have places already.
-    fn reach(&mut self, pieces: &mut [Piece<'_>], known: usize, start: Start) -> Reach {
-        let rests = pieces.last().is_some_and(|last| last.rests_after);
+    fn reach(&mut self, pieces: &mut [Piece<'_>], sight: Sight, known: usize, start: Start) -> Result<Reach, TooShort> {
+        let rests = match sight {
+            Sight::All => pieces.last().is_some_and(|last| last.rests_after),
+            Sight::Part { rests } => rests,
+        };
         let (mut beyond_ratio, mut intervals, mut beyond_lu) = (0.0, 0.0, 0.0);
         let mut usual = None;
         for index in 0..pieces.len() {
+            self.looked_at = index + 1;
+            // How a piece is cut hangs on those after it, and whether the path rests after the last one is not known.
+            if sight != Sight::All && index + NEAR_PIECES + 1 >= pieces.len() {
+                return Err(TooShort);
+            }
             pieces[index..].iter_mut().take(2).for_each(|piece| self.regime.look(piece));
             let length_lu = pieces[index].path.length_lu();
             // A piece at a rest is cut by its own grid.
@@ -416,11 +497,16 @@ impl Continuous {
             if let Some(usual) = usual
                 && (!rests || intervals > WHOLE_INTERVALS_MAX)
             {
-                return Reach { usual, whole: usual };
+                return Ok(Reach { usual, whole: usual });
             }
         }
         let whole = pieces.len();
-        Reach { usual: usual.unwrap_or(whole), whole }
+        Ok(Reach { usual: usual.unwrap_or(whole), whole })
+    }
+
+    /// The usual reach in a window that is known whole.
+    fn usual_reach(&mut self, pieces: &mut [Piece<'_>], start: Start) -> usize {
+        self.reach(pieces, Sight::All, 0, start).map_or(pieces.len(), |reach| reach.usual)
     }
 
     /// Makes the grid of a piece, if it has none, or one for the end of a window that has moved on to a slow place.

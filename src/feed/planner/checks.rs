@@ -3,14 +3,14 @@
 //! In: what is known of a piece that was pushed. Out: an alarm, or nothing. Does not plan.
 
 use crate::base::Diagnostic;
-use crate::feed::continuous::Flow;
+use crate::feed::continuous::Flowing;
 use crate::feed::limits::PieceLimits;
 use crate::kinematics::JointPath;
 use crate::program::BlockRef;
 
 /// As [`check_motion`], under `continuous`.
 pub(super) fn check_flow(
-    flow: &Flow,
+    flow: &Flowing,
     length_lu: f64,
     path: &JointPath,
     blocked: Option<String>,

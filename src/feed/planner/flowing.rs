@@ -5,7 +5,7 @@
 //! Does not plan: [`Continuous`] does.
 
 use super::{Entry, Motion, PLANNED_PIECES_MAX, Planner};
-use crate::feed::continuous::{Change, Continuous, Piece};
+use crate::feed::continuous::{Change, Continuous, Piece, Sight};
 use crate::feed::feed_override::OverrideCourse;
 use crate::feed::profile::standstill;
 use crate::feed::synchronised::{Seen, SynchronisedActions};
@@ -28,14 +28,24 @@ struct Window<'a> {
     entries: &'a mut VecDeque<Entry>,
     admitted: usize,
     ends_path: bool,
+    /// The path rests somewhere in it.
+    rests: bool,
 }
 
 impl Window<'_> {
     /// The pieces that move, up to a rest at most.
     fn pieces(&mut self) -> Vec<Piece<'_>> {
+        self.first_pieces(usize::MAX).0
+    }
+
+    /// The first `count` of them.
+    fn first_pieces(&mut self, count: usize) -> (Vec<Piece<'_>>, Sight) {
         let (admitted, ends_path) = (self.admitted, self.ends_path);
         let mut pieces: Vec<Piece<'_>> = Vec::new();
         for (index, entry) in self.entries.range_mut(..admitted).take(PLANNED_PIECES_MAX).enumerate() {
+            if pieces.len() >= count {
+                return (pieces, Sight::Part { rests: self.rests });
+            }
             let Entry { path, motion, corner, rests_after, .. } = entry;
             if index > 0 && corner.velocity_lu_s == 0.0 {
                 if let Some(last) = pieces.last_mut() {
@@ -45,7 +55,10 @@ impl Window<'_> {
             }
             let rests_after = *rests_after || (ends_path && index + 1 == admitted);
             match motion {
-                Motion::Flows(flow) => pieces.push(Piece { path, flow, junction: *corner, rests_after }),
+                Motion::Flows(flow) => {
+                    let flow = flow.look(path);
+                    pieces.push(Piece { path, flow, junction: *corner, rests_after });
+                }
                 _ => {
                     if let Some(last) = pieces.last_mut() {
                         last.rests_after |= rests_after;
@@ -56,7 +69,19 @@ impl Window<'_> {
                 break;
             }
         }
-        pieces
+        (pieces, Sight::All)
+    }
+
+    /// Plans with as much of the window as a plan needs: what lies beyond it costs nothing, however long the window is.
+    fn plan(&mut self, continuous: &mut Continuous) {
+        let mut count = continuous.looks_at();
+        loop {
+            let (mut pieces, sight) = self.first_pieces(count);
+            if continuous.plan(&mut pieces, sight) {
+                return;
+            }
+            count = count.saturating_mul(2);
+        }
     }
 
     fn front_is_held(&mut self, continuous: &Continuous) -> bool {
@@ -68,6 +93,7 @@ impl Planner {
     /// The law of the front piece under `continuous`; `None` where it does not move.
     pub(super) fn flow(&mut self) -> Option<TimeLaw> {
         let ends_path = self.window_ends_path();
+        let rests = ends_path || self.rests > 0;
         let Self { continuous, entries, admitted, overrides, actions, held, elapsed_s, .. } = self;
         let continuous = continuous.as_mut()?;
         let front = entries.front()?;
@@ -76,13 +102,13 @@ impl Planner {
         }
         let (length_lu, block) = (front.path.length_lu(), front.path.contour.block);
         let mut course = Course::new(overrides, actions, &front.path, *elapsed_s);
-        let mut window = Window { entries, admitted: *admitted, ends_path };
+        let mut window = Window { entries, admitted: *admitted, ends_path, rests };
         let mut planned = false;
         loop {
             course.overrides.advance(course.now_s);
             planned |= course.take_override(continuous, &mut window);
             if !planned && !continuous.holds_front() {
-                continuous.plan(&mut window.pieces());
+                window.plan(continuous);
             }
             if continuous.override_ratio() == 0.0 && window.front_is_held(continuous) {
                 if !course.wait(continuous.front_start_lu()) {

@@ -150,7 +150,7 @@ impl Track {
             let to_lu = if i == count { whole_lu } else { along_lu - start_lu };
             if let Some(shared) = &shared {
                 let to_shared_lu = if i == count { f64::INFINITY } else { shared.length_at_lu(to_lu) };
-                let curve = Curve::Polynomial(shared.clone()).trimmed(from_shared_lu, to_shared_lu);
+                let curve = Curve::from(shared.clone()).trimmed(from_shared_lu, to_shared_lu);
                 from_shared_lu = to_shared_lu;
                 self.hand_over(curve, ready);
             } else {
@@ -186,7 +186,7 @@ impl Track {
         let curve =
             PolynomialCurve::new(self.end, PartPoint(end), &Arc::new(PolynomialGeometry { pieces }), &self.linear);
         let curve = if curve.length_lu() > 0.0 {
-            Curve::Polynomial(curve)
+            Curve::from(curve)
         } else {
             Curve::Line(Line::new(self.end, PartPoint(end), &self.linear))
         };
