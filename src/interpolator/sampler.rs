@@ -163,9 +163,11 @@ impl Interpolator {
     /// called for every piece that begins at or before k * t_s. `None` after the set-point at the end of the path, or if there is no
     /// path at all.
     pub fn sample(&mut self, k: u64, next: &mut impl FnMut() -> Option<PlannedPiece>) -> Option<Setpoint> {
-        let mut setpoint = self.path_sample(k, next)?;
-        self.overlay.add(k, &mut setpoint.axes);
-        Some(setpoint)
+        let mut sampled = self.path_sample(k, next);
+        if let Some(setpoint) = &mut sampled {
+            self.overlay.add(k, &mut setpoint.axes);
+        }
+        sampled
     }
 
     /// The set-point of the path alone.

@@ -125,6 +125,8 @@ pub struct Kernel<S = Preparation> {
     spindle: SpindleLag,
     kinematics: Kinematics,
     contour_error: ContourErrorMeter,
+    /// Tool poses and the contour error are looked at.
+    poses: bool,
     figures: Figures,
     ahead: Sampled,
     output: CycleOutput,
@@ -190,12 +192,18 @@ impl<S: PieceSource> Kernel<S> {
             ),
             kinematics,
             contour_error: ContourErrorMeter::new(),
+            poses: true,
             figures: Figures::default(),
             ahead: Sampled { setpoint: None, begun: Vec::with_capacity(BEGUN_USUAL) },
             output,
             next_setpoint: 0,
             machine,
         }
+    }
+
+    /// Without tool poses and contour error, where nobody looks at the output of a cycle: no figure needs them.
+    pub fn without_poses(self) -> Self {
+        Self { poses: false, ..self }
     }
 
     /// With the rows that a recording asks for.
@@ -228,23 +236,28 @@ impl<S: PieceSource> Kernel<S> {
             self.sample_ahead();
         }
         std::mem::swap(&mut self.output.begun, &mut self.ahead.begun);
-        self.output.setpoint = self.ahead.setpoint.take();
-        let Some(setpoint) = self.output.setpoint else { return Ok(Status::Finished) };
+        // Set-points are large: here and below they are looked at where they are.
+        self.output.setpoint = self.ahead.setpoint;
+        if self.output.setpoint.is_none() {
+            return Ok(Status::Finished);
+        }
         let counts = self.resting.is_none();
         self.sample_ahead();
         for begun in &self.output.begun {
             self.figures.piece(begun);
         }
         self.clamping.begin(&self.machine, &self.output.begun);
-        if counts {
-            self.figures.setpoint(&setpoint);
+        if let Some(setpoint) = &self.output.setpoint {
+            if counts {
+                self.figures.setpoint(setpoint);
+            }
+            self.output.spindle = self.spindle.step(&setpoint.spindle);
         }
-        self.output.spindle = self.spindle.step(&setpoint.spindle);
-        let stepped = self.step_drives(&setpoint);
+        let stepped = self.step_drives();
         if self.sorts_rows {
             self.output.rows.sort_unstable_by_key(|row| (row.tick, row.axis));
         }
-        self.measure(&setpoint);
+        self.measure();
         stepped.map(|()| Status::Running)
     }
 
@@ -289,15 +302,13 @@ impl<S: PieceSource> Kernel<S> {
     }
 
     /// All position ticks from this set-point up to the next one (only the first after the last set-point).
-    fn step_drives(&mut self, setpoint: &Setpoint) -> Result<(), Diagnostic> {
+    fn step_drives(&mut self) -> Result<(), Diagnostic> {
         self.output.rows.clear();
         let wait = self.resting.or(self.interpolator.exact_stop_wait());
         let last = self.ahead.setpoint.is_none();
-        let next = self.ahead.setpoint.unwrap_or(*setpoint);
         let ticks = if last { 1 } else { self.machine.cycle.time_base.ticks_per_setpoint() };
         for offset in (0..ticks).step_by(self.row_ticks as usize) {
-            let tick = Tick(setpoint.tick.0 + offset);
-            self.send(setpoint, &next, offset);
+            let Some((tick, line)) = self.send(offset) else { return Ok(()) };
             if self.sorts_rows && !last {
                 self.step_with_rows(tick);
             } else {
@@ -306,30 +317,29 @@ impl<S: PieceSource> Kernel<S> {
                 drives.step_some(|place| inputs.get(place).copied().flatten(), |place, now| signals[place] = *now);
             }
             // All axes have stepped: behind an alarm of one the others have their rows, too, and brake from what they were told.
+            let Self { machine, drives, step, figures, output, in_position, clamping, .. } = self;
             let mut alarm = None;
-            for axis in self.machine.axis_ids() {
-                if self.step.inputs[axis].is_none() {
+            for axis in machine.axis_ids() {
+                if step.inputs[axis].is_none() {
                     continue;
                 }
-                let (setpoint_sent, signals) = (self.step.sent[axis], self.step.signals[axis]);
-                if !self.drives.is_finite(axis.index()) {
-                    alarm = alarm.or_else(|| Some(diverged(&self.machine, axis, tick)));
+                let signals = &step.signals[axis];
+                if !drives.is_finite(axis.index()) {
+                    alarm = alarm.or_else(|| Some(diverged(machine, axis, tick)));
                     continue;
                 }
-                self.figures.drive(axis, &signals);
-                let row = AxisRow { tick, axis, setpoint: setpoint_sent, signals };
-                self.output.rows.push(row);
+                figures.drive(axis, signals);
+                output.rows.push(AxisRow { tick, axis, setpoint: step.sent[axis], signals: *signals });
                 if let Some(wait) = &wait {
-                    self.in_position.hear(tick, axis, wait, &signals);
+                    in_position.hear(tick, axis, wait, signals);
                 }
-                let line = setpoint.path.block.line;
+                let Some(row) = output.rows.last() else { continue };
                 alarm = alarm
-                    .or_else(|| monitored(&self.machine, Some(line), &row))
-                    .or_else(|| self.clamping.watch(&self.machine, line, &row));
+                    .or_else(|| monitored(machine, Some(line), row))
+                    .or_else(|| clamping.watch(machine, line, row));
             }
-            let apart = wait.as_ref().and_then(|wait| self.in_position.apart(tick, wait));
-            let line = setpoint.path.block.line;
-            let alarm = alarm.or_else(|| apart.map(|apart| never_together(&self.machine, line, tick, &apart)));
+            let apart = wait.as_ref().and_then(|wait| in_position.apart(tick, wait));
+            let alarm = alarm.or_else(|| apart.map(|apart| never_together(machine, line, tick, &apart)));
             if let Some(alarm) = alarm {
                 return Err(alarm);
             }
@@ -337,22 +347,26 @@ impl<S: PieceSource> Kernel<S> {
         Ok(())
     }
 
-    /// What the axes get `offset` ticks behind `setpoint`.
-    fn send(&mut self, setpoint: &Setpoint, next: &Setpoint, offset: u64) {
-        for axis in self.machine.axis_ids() {
-            let cycle = &self.position_cycles[axis.index()];
+    /// What the axes get `offset` ticks behind the set-point; when that is, and its line.
+    fn send(&mut self, offset: u64) -> Option<(Tick, u32)> {
+        let Self { machine, position_cycles, step, output, ahead, .. } = self;
+        let setpoint = output.setpoint.as_ref()?;
+        let next = ahead.setpoint.as_ref().unwrap_or(setpoint);
+        for axis in machine.axis_ids() {
+            let cycle = &position_cycles[axis.index()];
             if !offset.is_multiple_of(cycle.ticks) {
-                self.step.inputs[axis] = None;
+                step.inputs[axis] = None;
                 continue;
             }
             let sent = cycle.fine.at(&setpoint.axes[axis], &next.axes[axis], offset / cycle.ticks);
-            self.step.sent[axis] = sent;
-            self.step.inputs[axis] = Some(DriveInput {
+            step.sent[axis] = sent;
+            step.inputs[axis] = Some(DriveInput {
                 position_setpoint_lu: sent.position_lu,
                 load_n_m: 0.0,
                 feedforward_active: setpoint.feedforward_active,
             });
         }
+        Some((Tick(setpoint.tick.0 + offset), setpoint.path.block.line))
     }
 
     /// Every drive alone, with the rows between its position ticks.
@@ -369,18 +383,22 @@ impl<S: PieceSource> Kernel<S> {
     }
 
     /// Tool poses and contour error at the set-point.
-    fn measure(&mut self, setpoint: &Setpoint) {
+    fn measure(&mut self) {
+        let Self { output, kinematics, contour_error, drives, poses, .. } = self;
+        let Some(setpoint) = output.setpoint.as_ref().filter(|_| *poses) else { return };
         let sent = MachinePoint(PerAxis::from_fn(|axis| setpoint.axes[axis].position_lu));
+        output.tool_setpoint = kinematics.tip_pose(&sent, &setpoint.tool_length);
+        output.tool_actual = output.tool_setpoint;
+        if !drives.has_cascade() {
+            return;
+        }
         let mut actual = sent;
-        for row in self.output.rows.iter().filter(|row| row.tick == setpoint.tick) {
+        for row in output.rows.iter().filter(|row| row.tick == setpoint.tick) {
             actual.0[row.axis] = row.signals.position_actual_lu;
         }
-        self.output.tool_setpoint = self.kinematics.tip_pose(&sent, &setpoint.tool_length);
-        self.output.tool_actual = self.kinematics.tip_pose(&actual, &setpoint.tool_length);
-        self.contour_error.push(self.output.tool_setpoint.position_mm);
-        if self.drives.has_cascade() {
-            self.output.contour_error_mm = self.contour_error.distance_mm(self.output.tool_actual.position_mm);
-        }
+        output.tool_actual = kinematics.tip_pose(&actual, &setpoint.tool_length);
+        contour_error.push(output.tool_setpoint.position_mm);
+        output.contour_error_mm = contour_error.distance_mm(output.tool_actual.position_mm);
     }
 
     /// The spindle one t_s later.

@@ -125,6 +125,9 @@ fn drive_loop<S: PieceSource>(
 ) -> Result<RunOutcome, RunError> {
     let machine = kernel.machine().clone();
     let mut recorder = open_recorder(&options, &machine)?;
+    if recorder.is_none() {
+        kernel = kernel.without_poses();
+    }
     let mut pacer = options.pace_ratio.map(|ratio| Pacer::new(ratio, &machine));
     let (mut drive_alarm, mut opened) = (None, OpenedPrograms::default());
     while drive_alarm.is_none() {
@@ -146,7 +149,7 @@ fn drive_loop<S: PieceSource>(
         if let Some(recorder) = &mut recorder {
             record_cycle(recorder, &machine, output).map_err(RunError)?;
         }
-        if let Some(setpoint) = output.setpoint.filter(|setpoint| setpoint.tick.0.is_multiple_of(PROGRESS_TICKS)) {
+        if let Some(setpoint) = output.setpoint.as_ref().filter(|setpoint| setpoint.tick.0.is_multiple_of(PROGRESS_TICKS)) {
             progress(Progress {
                 time_s: machine.cycle.time_base.time_s(setpoint.tick),
                 line: setpoint.path.block.line,

@@ -49,8 +49,9 @@ impl Profile {
         !dips || from.speed_squared_lu2_s2 > 0.5 * from.slope_lu_s2 * from.slope_lu_s2 / bend
     }
 
-    /// What holds the speed in an interval: of the limits what is used most at its middle, of the junctions at its ends what is reached.
-    pub fn limit(&self, chain: &Chain, index: usize) -> Limit {
+    /// What holds the speed in an interval, and how much of it is used: of the limits what is used most at its middle, of the junctions at its ends what is
+    /// reached; of a speed the square counts.
+    pub fn limit(&self, chain: &Chain, index: usize) -> (f64, Limit) {
         let interval = &chain.intervals[index];
         let (point, bend) = self.inside(chain, index, 0.5);
         let feed = (point.speed_squared_lu2_s2 / interval.cap.velocity_lu_s.powi(2), interval.cap.limit);
@@ -69,7 +70,7 @@ impl Profile {
                 offer(JUNCTION_SHARE * b / junction.speed_squared_lu2_s2, junction.limit);
             }
         }
-        most.1
+        most
     }
 }
 
