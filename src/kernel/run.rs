@@ -149,7 +149,9 @@ fn drive_loop<S: PieceSource>(
         if let Some(recorder) = &mut recorder {
             record_cycle(recorder, &machine, output).map_err(RunError)?;
         }
-        if let Some(setpoint) = output.setpoint.as_ref().filter(|setpoint| setpoint.tick.0.is_multiple_of(PROGRESS_TICKS)) {
+        if let Some(setpoint) =
+            output.setpoint.as_ref().filter(|setpoint| setpoint.tick.0.is_multiple_of(PROGRESS_TICKS))
+        {
             progress(Progress {
                 time_s: machine.cycle.time_base.time_s(setpoint.tick),
                 line: setpoint.path.block.line,

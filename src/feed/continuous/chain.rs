@@ -81,6 +81,10 @@ const DISTURBED_RATIO: f64 = 1.6;
 const LEVEL_RATIO: f64 = 1.0 + 1e-6;
 const DIP_RATIO: f64 = 0.75;
 
+/// Where the mean braking from a place to the end is less than this share of the hardest there is, the path slows down there for reasons of its own: of a
+/// stop with constant jerk the mean falls to two thirds from the middle of the ramp to its start, and from there on with the way.
+const SOFT_RATIO: f64 = 0.25;
+
 /// Attempts with tighter limits where those between the places do not hold.
 const ATTEMPTS_MAX: u32 = 8;
 
@@ -115,16 +119,22 @@ pub(super) struct Planning {
 }
 
 impl Profile {
-    /// The border where the path begins to brake for its end: before it the path is clearly slower again, or it is the fastest of all. Of a slow place just
-    /// before the end, which the end makes slower still, nothing says how fast the path could go through it.
-    pub fn summit(&self) -> usize {
+    /// The border where the path begins to brake for its end: before it the path is clearly slower again, or it is the fastest of all, as far as the end
+    /// can be felt. Of a slow place just before the end, which the end makes slower still, nothing says how fast the path could go through it; of a fast
+    /// one far before it nothing says that it is the end for which the path slows down.
+    pub fn summit(&self, chain: &Chain) -> usize {
         let b = |index: usize| self.points[index].speed_squared_lu2_s2;
         let mut summit = self.points.len().saturating_sub(1);
+        let (mut way_lu, mut hardest_lu_s2) = (0.0, 0.0_f64);
         for index in (0..summit).rev() {
+            way_lu += chain.intervals[index].length_lu();
+            let braking_lu_s2 = b(index) / way_lu;
+            hardest_lu_s2 = hardest_lu_s2.max(braking_lu_s2);
+            if b(index) < DIP_RATIO * b(summit) || braking_lu_s2 < SOFT_RATIO * hardest_lu_s2 {
+                break;
+            }
             if b(index) > LEVEL_RATIO * b(summit) {
                 summit = index;
-            } else if b(index) < DIP_RATIO * b(summit) {
-                break;
             }
         }
         summit
@@ -135,7 +145,7 @@ impl Profile {
         let length_lu =
             |range: std::ops::Range<usize>| chain.intervals[range].iter().map(Interval::length_lu).sum::<f64>();
         let count = chain.intervals.len();
-        let kept_lu = length_lu(0..count) - DISTURBED_RATIO * length_lu(self.summit().min(count)..count);
+        let kept_lu = length_lu(0..count) - DISTURBED_RATIO * length_lu(self.summit(chain).min(count)..count);
         let mut way_lu = 0.0;
         let ends = chain.intervals.iter().map(|interval| {
             way_lu += interval.length_lu();

@@ -17,15 +17,20 @@ const CUTS_RATIO: [f64; 5] = [0.0, 0.08, 0.2, 0.5, 1.0];
 /// One piece of so many is handed out at least before the next plan.
 const STALE_PIECES: usize = 20;
 
+/// A block has so many blends at its end at most.
+const BLENDS_MAX: usize = 2;
+
 /// Where a plan begins with rising speed its first interval has at least this share of its length.
 const RISE_MIN_SHARE: f64 = 1e-3;
 
 /// Intervals of a plan that are handed out before the next one in any case. Where all of a plan brakes, planning again for each piece would cost more
 /// than a window that is a little shorter. The front is handed out always, and with it all that share its interval: a plan begins where an
-/// interval does.
+/// interval does. So are the blends behind it that belong to its block: the window gets no further before the next block begins.
 pub(super) fn handed_out(places: &VecDeque<Place>) -> usize {
     let stale = (places.len() / STALE_PIECES).saturating_sub(1);
-    places.get(stale).map_or(0, |place| place.intervals.end)
+    let goes_on = |index: usize| index + 1 < places.len() && !places[index].begins_block;
+    let same_block = (stale + 1..).take(BLENDS_MAX).take_while(|index| goes_on(*index)).count();
+    places.get(stale + same_block).map_or(0, |place| place.intervals.end)
 }
 
 /// Where a piece is in a chain.
@@ -34,6 +39,8 @@ pub(super) struct Place {
     pub intervals: Range<usize>,
     /// What it has of the one interval that it shares, from the start of that; `None`: all of its intervals.
     pub part_lu: Option<[f64; 2]>,
+    /// A motion block begins with the piece.
+    pub begins_block: bool,
 }
 
 impl Place {
@@ -73,7 +80,7 @@ impl Layout {
                 layout.chain.junctions.push(chain.junctions[shift + index]);
                 layout.owners.push(piece);
             }
-            layout.places.push_back(Place { intervals: start..end, part_lu: place.part_lu });
+            layout.places.push_back(Place { intervals: start..end, ..place.clone() });
         }
         layout
     }
@@ -97,7 +104,8 @@ impl Layout {
                     for piece in &pieces[first..first + count] {
                         let to_lu = from_lu + piece.path.length_lu();
                         let part_lu = (count > 1).then_some([from_lu, to_lu]);
-                        self.places.push_back(Place { intervals: index..index + 1, part_lu });
+                        let begins_block = begins_block(piece);
+                        self.places.push_back(Place { intervals: index..index + 1, part_lu, begins_block });
                         from_lu = to_lu;
                     }
                     first += count;
@@ -248,8 +256,13 @@ impl Layout {
         }
         let end = self.chain.intervals.len();
         self.owners.resize(end, owner);
-        self.places.push_back(Place { intervals: start..end, part_lu: None });
+        let begins_block = begins_block(piece);
+        self.places.push_back(Place { intervals: start..end, part_lu: None, begins_block });
     }
+}
+
+fn begins_block(piece: &Piece<'_>) -> bool {
+    piece.path.contour.blocks_begun > 0
 }
 
 fn junction(piece: &Piece<'_>) -> Junction {

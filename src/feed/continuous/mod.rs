@@ -455,7 +455,7 @@ impl Continuous {
         if rests {
             return;
         }
-        self.braking = self.profile.summit();
+        self.braking = self.profile.summit(&self.chain);
         self.kept = self.profile.kept(&self.chain);
         self.disturbed = self.kept;
         self.kept = self.kept.max(layout::handed_out(&self.places));
