@@ -16,12 +16,15 @@ mod support;
 
 const BLOCKS: u32 = 4000;
 
-fn program(segment_mm: f64) -> support::Program {
+/// So many that start and end of the path count for little, also where a window of 1000 is planned to the end of the path at once.
+const LONG_BLOCKS: u32 = 40_000;
+
+fn program(segment_mm: f64, blocks: u32) -> support::Program {
     // A closed curve of varying curvature.
-    let radius_mm = f64::from(BLOCKS) * segment_mm / std::f64::consts::TAU;
-    let points: Vec<[f64; 2]> = (1..=BLOCKS)
+    let radius_mm = f64::from(blocks) * segment_mm / std::f64::consts::TAU;
+    let points: Vec<[f64; 2]> = (1..=blocks)
         .map(|i| {
-            let angle = f64::from(i) / f64::from(BLOCKS) * std::f64::consts::TAU;
+            let angle = f64::from(i) / f64::from(blocks) * std::f64::consts::TAU;
             let r = radius_mm * (1.0 + 0.2 * (7.0 * angle).sin());
             [r * angle.cos() - radius_mm, r * angle.sin()]
         })
@@ -36,7 +39,7 @@ fn plan(criterion: &mut Criterion) {
     for (segment_mm, window) in [(0.5, 8), (0.5, 100), (0.5, 1000), (5.0, 8), (5.0, 100)] {
         let mut machine = support::spinner();
         machine.look_ahead_blocks = window;
-        let paths = program(segment_mm).paths(&machine);
+        let paths = program(segment_mm, BLOCKS).paths(&machine);
         group.bench_function(format!("{segment_mm} mm, window {window}"), |bencher| {
             bencher.iter_batched(|| paths.clone(), |paths| plan_all(&machine, paths), BatchSize::LargeInput);
         });
@@ -47,19 +50,19 @@ fn plan(criterion: &mut Criterion) {
 /// The same under `continuous`: lines as they are, and what the compressor makes of them; one window is ten times the other.
 fn plan_continuous(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("blocks planned, continuous");
-    group.sample_size(20);
-    group.throughput(Throughput::Elements(u64::from(BLOCKS)));
-    for (name, mode, compressor) in [
-        ("lines", PathMode::G64, Compressor::Off),
-        ("compressed", PathMode::G642, Compressor::Cad),
-        ("blends", PathMode::G642, Compressor::Off),
+    group.sample_size(10);
+    for (name, mode, compressor, blocks) in [
+        ("lines", PathMode::G64, Compressor::Off, LONG_BLOCKS),
+        ("compressed", PathMode::G642, Compressor::Cad, LONG_BLOCKS),
+        ("blends", PathMode::G642, Compressor::Off, BLOCKS),
     ] {
+        group.throughput(Throughput::Elements(u64::from(blocks)));
         for window in [100, 1000] {
             let mut machine = support::spinner();
             machine.look_ahead_blocks = window;
             machine.feed.time_law = TimeLawKind::Continuous;
             machine.smoothing.shape = BlendShape::Quintic;
-            let mut program = program(0.3);
+            let mut program = program(0.3, blocks);
             for motion in &mut program.moves {
                 motion.modes.path_mode = mode;
                 motion.modes.compressor = compressor;
@@ -92,7 +95,7 @@ fn sample(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("set-points");
     group.sample_size(20);
     for segment_mm in [0.5, 5.0] {
-        let planned = program(segment_mm).planned(&machine);
+        let planned = program(segment_mm, BLOCKS).planned(&machine);
         let count = support::sample(&machine, planned.clone()).len() as u64;
         group.throughput(Throughput::Elements(count));
         group.bench_function(format!("{segment_mm} mm segments"), |bencher| {

@@ -12,9 +12,10 @@ use super::interval::{Interval, cap};
 use super::layout::{self, Layout};
 use super::{Continuous, Piece, look};
 
-/// What intervals that are too long may cost together, of the time of a plan; so far it pays to plan again.
+/// What intervals that are too long may cost together, of the time of a plan; so far it pays to plan again. The last plan of a path is not made again.
 const COST_RATIO: f64 = 1e-3;
 const COST_MAX_RATIO: f64 = 2.0 * COST_RATIO;
+const LAST_COST_MAX_RATIO: f64 = COST_RATIO;
 
 /// Where a plan became so much faster than was expected, of its time, first order says too little: a profile may go from one limit to the opposite one
 /// and back where there was no room for that. There half of the cost and more is worth another plan.
@@ -60,7 +61,8 @@ impl Continuous {
             let (layout, profile) = &best;
             let costs = self.costs(layout, profile, pieces, start, pass == 0);
             let cost: f64 = costs.iter().sum();
-            if cost <= COST_MAX_RATIO && !surprises {
+            let cost_max_ratio = if self.planning.is_last { LAST_COST_MAX_RATIO } else { COST_MAX_RATIO };
+            if cost <= cost_max_ratio && !surprises {
                 break;
             }
             let parts = parts(&costs, COST_RATIO.min(LEFT_SHARE * cost));
@@ -68,20 +70,41 @@ impl Continuous {
                 break;
             }
             let before_s = profile.time_s(&layout.chain);
-            let mut finer = layout.clone();
-            finer.divide(&parts, pieces);
-            let hints = profile.divided(&layout.chain, &parts);
-            self.planning.handed_out = layout::handed_out(&finer.places);
-            let planned = self.planning.plan(&mut finer.chain, start, &hints, &look(pieces, &finer.owners));
-            let Some(next) = planned else { break };
-            let gained = 1.0 - next.time_s(&finer.chain) / before_s;
+            let Some(next) = self.finer(layout, profile, &parts, pieces, start) else { break };
+            let gained = 1.0 - next.1.time_s(&next.0.chain) / before_s;
             if gained.is_nan() || gained < 0.0 {
                 break;
             }
             surprises = gained > cost + SURPRISE_RATIO;
-            best = (finer, next);
+            best = next;
         }
         best
+    }
+
+    /// The plan with intervals in parts, from the one before. Of the last plan of a path, where that way leads nowhere, also from nothing and with half of the
+    /// parts: no later plan would find what is lost.
+    fn finer(
+        &mut self,
+        layout: &Layout,
+        profile: &Profile,
+        parts: &[usize],
+        pieces: &[Piece<'_>],
+        start: Start,
+    ) -> Option<(Layout, Profile)> {
+        let mut attempt = |parts: &[usize], hints: &[PathPoint]| {
+            let mut finer = layout.clone();
+            finer.divide(parts, pieces);
+            self.planning.handed_out = layout::handed_out(&finer.places);
+            let planned = self.planning.plan(&mut finer.chain, start, hints, &look(pieces, &finer.owners));
+            planned.map(|profile| (finer, profile))
+        };
+        let planned = attempt(parts, &profile.divided(&layout.chain, parts));
+        let is_last = pieces.last().is_some_and(|last| last.rests_after);
+        if planned.is_some() || !is_last {
+            return planned;
+        }
+        let fewer: Vec<usize> = parts.iter().map(|parts| parts.div_ceil(2)).collect();
+        attempt(parts, &[]).or_else(|| attempt(&fewer, &profile.divided(&layout.chain, &fewer)))
     }
 
     /// What each interval costs because it is not in parts, of the time of the plan; after a plan of this layout. Nothing where the next plan comes
