@@ -213,6 +213,16 @@ impl Planning {
         None
     }
 
+    /// The last plan is the solution of its last problem, not one of an earlier round.
+    pub fn is_solved(&self) -> bool {
+        self.solved
+    }
+
+    /// There are no prices until the next plan.
+    pub fn forget_solution(&mut self) {
+        self.solved = false;
+    }
+
     /// Of the interval after a node of the last plan; `None` if that was not the solution of its last problem.
     pub fn prices(&self, node: usize, pinched: bool) -> Option<Prices> {
         let is_cap = |label| label == Label::Cap;

@@ -81,8 +81,8 @@ impl Continuous {
         best
     }
 
-    /// The plan with intervals in parts, from the one before. Of the last plan of a path, where that way leads nowhere, also from nothing and with half of the
-    /// parts: no later plan would find what is lost.
+    /// The plan with intervals in parts, from the one before. Of the last plan of a path, where that way ends before the solution, also from nothing and with
+    /// half of the parts: no later plan would find what is lost.
     fn finer(
         &mut self,
         layout: &Layout,
@@ -96,15 +96,25 @@ impl Continuous {
             finer.divide(parts, pieces);
             self.planning.handed_out = layout::handed_out(&finer.places);
             let planned = self.planning.plan(&mut finer.chain, start, hints, &look(pieces, &finer.owners));
-            planned.map(|profile| (finer, profile))
+            (planned.map(|profile| (finer, profile)), self.planning.is_solved())
         };
-        let planned = attempt(parts, &profile.divided(&layout.chain, parts));
+        let (first, solved) = attempt(parts, &profile.divided(&layout.chain, parts));
         let is_last = pieces.last().is_some_and(|last| last.rests_after);
-        if planned.is_some() || !is_last {
-            return planned;
+        if !is_last || (solved && first.is_some()) {
+            return first;
         }
         let fewer: Vec<usize> = parts.iter().map(|parts| parts.div_ceil(2)).collect();
-        attempt(parts, &[]).or_else(|| attempt(&fewer, &profile.divided(&layout.chain, &fewer)))
+        let time_s = |plan: &(Layout, Profile)| plan.1.time_s(&plan.0.chain);
+        let first_s = first.as_ref().map_or(f64::INFINITY, time_s);
+        for (parts, hints) in [(parts, Vec::new()), (&fewer[..], profile.divided(&layout.chain, &fewer))] {
+            let (next, solved) = attempt(parts, &hints);
+            if let Some(next) = next.filter(|next| solved && time_s(next) <= first_s) {
+                return Some(next);
+            }
+        }
+        // What is known of the costs is not that of this plan.
+        self.planning.forget_solution();
+        first
     }
 
     /// What each interval costs because it is not in parts, of the time of the plan; after a plan of this layout. Nothing where the next plan comes
