@@ -150,9 +150,14 @@ fn a_short_window_costs_time_and_says_so() {
         let time_s = total_s(&planned);
         assert!(time_s < before_s * 1.002, "{blocks} blocks: {time_s} s after {before_s} s");
         before_s = time_s;
-        let held = planned.iter().flat_map(|piece| piece.law.phases());
-        let ends = held.filter(|phase| phase.limit.kind == LimitKind::LookAhead).count();
+        let held =
+            |kind| planned.iter().flat_map(|piece| piece.law.phases()).filter(move |phase| phase.limit.kind == kind);
+        let ends = held(LimitKind::LookAhead).count();
         assert_eq!(ends > 0, blocks < 100, "{blocks} blocks: {ends} phases brake for the end of the window");
+        for phase in held(LimitKind::Feed) {
+            let speed_mm_s = phase.at(0.5 * phase.duration_s).velocity_lu_s;
+            assert!(speed_mm_s > 0.98 * 100.0, "{blocks} blocks: {speed_mm_s} mm/s, and F is said to hold it");
+        }
     }
 }
 

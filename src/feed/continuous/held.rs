@@ -19,6 +19,9 @@ const HELD_RATIO: f64 = 0.9995;
 /// A junction holds the speed where b comes this near to what it allows; of equals the junction is the weaker reason.
 const JUNCTION_SHARE: f64 = 0.999;
 
+/// A speed that is this near to what it may be, by its square, is reached: to a thousandth, as in the figure `programmed_feed_share`.
+const REACHED_RATIO: f64 = 0.998;
+
 /// A profile that uses a limit this many times is not slowed down but given up.
 const SLOWED_MAX_RATIO: f64 = 4.0;
 
@@ -41,6 +44,17 @@ impl Profile {
         (PathPoint { speed_squared_lu2_s2: b, slope_lu_s2: point.slope_lu_s2 + x * bend }, bend)
     }
 
+    /// State inside the interval of a start or a stop, `share` of its length from the rest.
+    fn near_rest(&self, chain: &Chain, index: usize, share: f64) -> (PathPoint, f64) {
+        let interval = &chain.intervals[index];
+        let (way_lu, power) = (share * interval.length_lu(), ray_exponent(interval));
+        let [from, to] = [index, index + 1].map(|border| self.points[border].speed_squared_lu2_s2);
+        let (b_end, sign) = if from <= 0.0 { (to, 1.0) } else { (from, -1.0) };
+        let b = b_end * share.portable_powf(power);
+        let point = PathPoint { speed_squared_lu2_s2: b, slope_lu_s2: sign * power * b / way_lu };
+        (point, power * (power - 1.0) * b / way_lu.powi(2))
+    }
+
     /// b stays above 0 between the ends of an interval: the parabola may dip below it where the path slows down at the start and speeds up at the end.
     fn goes_on(&self, chain: &Chain, index: usize) -> bool {
         let (from, bend) = (self.points[index], self.bends_per_s2[index]);
@@ -53,9 +67,12 @@ impl Profile {
     /// reached; of a speed the square counts.
     pub fn limit(&self, chain: &Chain, index: usize) -> (f64, Limit) {
         let interval = &chain.intervals[index];
-        let (point, bend) = self.inside(chain, index, 0.5);
-        let feed = (point.speed_squared_lu2_s2 / interval.cap.velocity_lu_s.powi(2), interval.cap.limit);
-        let mut most = feed;
+        let rests = [index, index + 1].map(|border| self.points[border].speed_squared_lu2_s2 <= 0.0);
+        let (point, bend) =
+            if rests == [false; 2] { self.inside(chain, index, 0.5) } else { self.near_rest(chain, index, 0.5) };
+        // A speed that is not reached holds nothing: between two ramps no axis may use much of its limits either.
+        let speed = point.speed_squared_lu2_s2 / interval.cap.velocity_lu_s.powi(2);
+        let mut most = (if speed >= REACHED_RATIO { speed } else { 0.0 }, interval.cap.limit);
         let mut offer = |used: f64, limit: Limit| {
             if used > most.0 {
                 most = (used, limit);
@@ -287,17 +304,12 @@ fn used_at_rest(chain: &Chain, profile: &Profile, index: usize, look: &Look<'_>)
 
 fn most_used_at_rest(chain: &Chain, profile: &Profile, index: usize, states: &[Derivatives; 9]) -> f64 {
     let interval = &chain.intervals[index];
-    let (h, power) = (interval.length_lu(), ray_exponent(interval));
-    let [from, to] = [index, index + 1].map(|border| profile.points[border].speed_squared_lu2_s2);
-    let (b_end, sign) = if from <= 0.0 { (to, 1.0) } else { (from, -1.0) };
+    let starts = profile.points[index].speed_squared_lu2_s2 <= 0.0;
     let mut most = 0.0_f64;
     for eighth in 1..=8 {
-        let share = 0.125 * eighth as f64;
-        let state = &states[if sign > 0.0 { eighth } else { 8 - eighth }];
-        let b = b_end * share.portable_powf(power);
-        let slope_lu_s2 = sign * power * b / (share * h);
-        let bend = power * (power - 1.0) * b / (share * h).powi(2);
-        let point = PathPoint { speed_squared_lu2_s2: b, slope_lu_s2 };
+        let state = &states[if starts { eighth } else { 8 - eighth }];
+        let (point, bend) = profile.near_rest(chain, index, 0.125 * eighth as f64);
+        let b = point.speed_squared_lu2_s2;
         for bound in &interval.bounds.axes {
             let [acceleration, jerk] = demands(bound, state, &point, bend);
             let jerk_ratio = jerk.abs() * b.sqrt() / bound.jerk_lu_s3.unwrap_or(f64::INFINITY);

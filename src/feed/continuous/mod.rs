@@ -56,9 +56,6 @@ const SLOWER_RATIO: f64 = 0.8;
 /// So many pieces more than the plan before looked at are in sight of a plan at first.
 const MORE_PIECES: usize = 2 * NEAR_PIECES;
 
-/// The square of a speed that comes this near to that of the feed: within a thousandth of the programmed feed, as in the figures.
-const REACHED_RATIO: f64 = 0.998;
-
 /// Places nearer to each other than this share of an interval are one.
 const SAME_PLACE_RATIO: f64 = 1e-9;
 
@@ -422,8 +419,7 @@ impl Continuous {
         }
         let limit = |index| {
             let (used_ratio, limit) = self.profile.limit(&self.chain, index);
-            // A feed that is not even reached where the end of the window is felt does not hold the path.
-            let own = limit.axis.is_none() && used_ratio >= REACHED_RATIO;
+            let own = limit.axis.is_none() && used_ratio > 0.0;
             let felt = index >= self.braking || (index >= self.disturbed && !own);
             if felt { Limit { kind: LimitKind::LookAhead, axis: None } } else { limit }
         };
