@@ -1,7 +1,8 @@
 //! A law that always exists: one piece from rest to rest, slowly.
 //!
-//! In: the intervals of a piece, or of what is left of it. Out: a seven-phase [`TimeLaw`] with the greatest demands of the whole piece: at the highest speed the bend takes half of
-//! what each axis allows, and changes of speed take the rest. Used where no plan was found from a state of rest.
+//! In: the intervals of a piece, or of what is left of it. Out: a [`TimeLaw`] of seven phases with the greatest demands of the whole piece: at the highest speed the bend takes half of
+//! what each axis allows, and changes of speed take the rest. Where one place is much slower than the others, as in a blend that all but turns back, it has a law of its own, with
+//! a rest before and after it: else the whole piece would creep. Used where no plan was found from a state of rest.
 
 use super::grid::Grid;
 use super::interval::Interval;
@@ -10,13 +11,31 @@ use crate::feed::profile::{Bounds, SpeedCap, Stretch, seven_phases};
 use crate::feed::ramp::Dynamics;
 use crate::feed::{Limit, LimitKind, Phase, TimeLaw};
 
+/// So often a piece is put in parts at its slowest place, and the parts again.
+const DEPTH_MAX: u32 = 64;
+
 /// The law of a piece alone.
 pub(super) fn alone(grid: &Grid) -> TimeLaw {
-    let [Some(begin), Some(last)] = [grid.intervals.first(), grid.intervals.last()] else { return TimeLaw::default() };
+    TimeLaw::new(quicker(&grid.intervals, DEPTH_MAX).phases().iter().copied())
+}
+
+/// The quicker one: a law for all of it, or one for the slowest place, one for what is before it and one for what is after it.
+fn quicker(intervals: &[Interval], depth: u32) -> TimeLaw {
+    let whole = rest_to_rest(intervals);
+    let slowest = (0..intervals.len()).min_by(|a, b| slow(&intervals[*a]).total_cmp(&slow(&intervals[*b])));
+    let Some(slowest) = slowest.filter(|_| intervals.len() > 1 && depth > 0) else { return whole };
+    let parts = [&intervals[..slowest], &intervals[slowest..=slowest], &intervals[slowest + 1..]];
+    let laws = parts.iter().filter(|part| !part.is_empty()).map(|part| quicker(part, depth - 1));
+    let parted = TimeLaw::new(laws.flat_map(|law| law.phases().to_vec()));
+    if parted.duration_s() < whole.duration_s() { parted } else { whole }
+}
+
+fn rest_to_rest(intervals: &[Interval]) -> TimeLaw {
+    let [Some(begin), Some(last)] = [intervals.first(), intervals.last()] else { return TimeLaw::default() };
     let limit = Limit { kind: LimitKind::LookAhead, axis: None };
-    let cap = grid.intervals.iter().map(slow).fold(f64::INFINITY, f64::min);
+    let cap = intervals.iter().map(slow).fold(f64::INFINITY, f64::min);
     let (mut acceleration, mut jerk) = (f64::INFINITY, f64::INFINITY);
-    for interval in &grid.intervals {
+    for interval in intervals {
         for bound in &interval.bounds.axes {
             let [first, second, _] = most(interval, bound.axis);
             acceleration = acceleration.min(0.5 * bound.acceleration_lu_s2 / first);
