@@ -73,6 +73,7 @@ fn judged(settings: &Settings, program: &Program, random: Option<Random>) -> Vec
             }
             Err(text) => vec![Finding { kind: Kind::Path, ratio: f64::INFINITY, text }],
         };
+        findings.extend(times::crept(settings, program, run.cycle_time_s()));
         findings.extend(times::reversed(settings, program));
         findings.extend(random.and_then(|mut random| times::split(settings, program, &mut random)));
         findings.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));

@@ -153,6 +153,16 @@ impl Program {
         Some(Self { blocks })
     }
 
+    /// With exact stops instead of corners that are passed, and without a compressor.
+    pub fn with_stops(&self) -> Self {
+        let stopped = |block: &Block| match block {
+            Block::Word(word) if word.starts_with("G64") => Block::Word(String::from("G60")),
+            Block::Word(word) if word.starts_with("COMP") => Block::Word(String::from("COMPOF")),
+            block => block.clone(),
+        };
+        Self { blocks: self.blocks.iter().map(stopped).collect() }
+    }
+
     /// A compressor is on somewhere.
     pub fn compresses(&self) -> bool {
         self.blocks.iter().any(|block| matches!(block, Block::Word(word) if word.starts_with("COMP")))

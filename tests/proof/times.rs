@@ -1,4 +1,4 @@
-//! The same path in another way takes the same time: reversed, and with a block in two.
+//! The same path in another way takes the same time: reversed, and with a block in two; with a stop at every block end it is not much quicker.
 
 use crate::program::{Block, Program};
 use crate::random::Random;
@@ -61,6 +61,23 @@ pub fn texts(settings: &Settings, program: &Program) -> Option<[String; 3]> {
     let (back, _) = back.text_from(settings, end, &opening);
     Some([there, approach, back])
 }
+
+/// The path goes on: with exact stops for its corners, and without a compressor, it would not take a third of the time. `None`: so it is, or that is no program. `seven-phase`
+/// drives a piece at the speed of its worst place, and promises nothing.
+pub fn crept(settings: &Settings, program: &Program, time_s: f64) -> Option<Finding> {
+    if settings.law == Law::SevenPhase {
+        return None;
+    }
+    let machine = Arc::new(settings.machine());
+    let stops = Run::new(&machine, &program.with_stops().text(settings)).ok()?;
+    let allowed_s = CREPT_RATIO * stops.cycle_time_s() + CREPT_MIN_S;
+    let text = format!("{time_s:.6} s, with exact stops {:.6} s", stops.cycle_time_s());
+    (time_s > allowed_s).then_some(Finding { kind: Kind::Creep, ratio: time_s / allowed_s, text })
+}
+
+/// So much longer than with exact stops a program never takes: a blend may bend more than the axes like, and the window be a block.
+const CREPT_RATIO: f64 = 3.0;
+const CREPT_MIN_S: f64 = 0.1;
 
 /// A line in two is the same motion. `None`: it is, or there is no line to split, or the split changes the path.
 pub fn split(settings: &Settings, program: &Program, random: &mut Random) -> Option<Finding> {

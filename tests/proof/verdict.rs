@@ -22,6 +22,8 @@ pub enum Kind {
     Split,
     /// The reversed path takes another time.
     Reversed,
+    /// With exact stops it would be far quicker.
+    Creep,
     /// The program is refused, or the kernel panics.
     Alarm,
 }
