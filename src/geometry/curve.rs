@@ -18,7 +18,7 @@ pub const DISPLACEMENT_MIN_LU: f64 = 1e-9;
 /// One curve.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Curve {
-    /// Straight in all axes; dense programs have nothing else, and it is moved a lot: what is larger has a place of its own.
+    /// Straight in all axes. Dense programs have little else, and curves are moved a lot: the larger ones are boxed.
     Line(Line),
     /// Circle or helix.
     Arc(Box<Arc>),
@@ -43,12 +43,6 @@ pub struct CurveState {
     pub second: AxisVector,
     /// q'''(s).
     pub third: AxisVector,
-}
-
-impl From<Line> for Curve {
-    fn from(line: Line) -> Self {
-        Self::Line(line)
-    }
 }
 
 impl From<Arc> for Curve {

@@ -16,7 +16,7 @@ const DEPTH_MAX: u32 = 64;
 
 /// The law of a piece alone.
 pub(super) fn alone(grid: &Grid) -> TimeLaw {
-    TimeLaw::new(quicker(&grid.intervals, DEPTH_MAX).phases().iter().copied())
+    quicker(&grid.intervals, DEPTH_MAX)
 }
 
 /// The quicker one: a law for all of it, or one for the slowest place, one for what is before it and one for what is after it.
