@@ -34,6 +34,10 @@ const SLOW_PLACES_SHARE: [f64; 3] = [0.3, 0.5, 0.7];
 const CUTS_MAX: u32 = 40;
 const INTERVALS_MAX: usize = 20_000;
 
+/// An interval that is no longer than this share of its piece stays whole: places on it are not known any better (`geometry::arc_length`). Around a step of
+/// curvature that stands at no knot, as in the middle of a blend that all but turns back, it would be cut until nothing is left.
+const SHORTEST_SHARE: f64 = 1e-9;
+
 /// Within an interval the jerk that the axes allow along the tangent changes by this factor at most: where a slow axis takes over from a fast one the
 /// profile does so, too. Chosen: a factor of 1.4, as in a bend between two like axes, must not cut.
 const STEADY_MAX_RATIO: f64 = 2.0;
@@ -302,7 +306,8 @@ impl<'a> Cutter<'a> {
         while let Some((to, cuts)) = waiting.pop() {
             let middle_lu = 0.5 * (from.0 + to.0);
             let middle = self.look(middle_lu);
-            let enough = cuts >= CUTS_MAX || self.intervals.len() + waiting.len() >= INTERVALS_MAX;
+            let short = to.0 - from.0 <= SHORTEST_SHARE * self.path.length_lu();
+            let enough = short || cuts >= CUTS_MAX || self.intervals.len() + waiting.len() >= INTERVALS_MAX;
             if rest
                 || enough
                 || (cuts >= cuts_min
