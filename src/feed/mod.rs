@@ -5,6 +5,7 @@
 
 mod blend_limits;
 mod continuous;
+mod crept;
 mod feed_override;
 mod group;
 mod junction;

@@ -12,6 +12,7 @@
 //! ([`Planner::tell_waited`]), so that all times here are those of the run. Does not sample, and does not know axes: `limits` and `junction` do.
 
 use super::continuous::{Continuous, Flowing};
+use super::crept::Crept;
 use super::feed_override::{OverrideCourse, OverrideSchedule};
 use super::junction::{self, FREE, STOP};
 use super::limits::{AxisRules, Ends, PieceLimits};
@@ -88,6 +89,8 @@ pub struct Planner {
     waits: Waits,
     /// What the printed blend law did.
     published: Tally,
+    /// Blends that take longer than a stop.
+    crept: Crept,
     /// Where it came to a stand first, and whether that has been told.
     stalled: Option<(BlockRef, bool)>,
     /// Half of the blend that was admitted last, if nothing moved since: part of the next block.
@@ -177,6 +180,7 @@ impl Planner {
             late_told: false,
             waits: Waits::default(),
             published: Tally::default(),
+            crept: Crept::default(),
             stalled: None,
             half_blend_lu: 0.0,
             continuous: (machine.feed.time_law == TimeLawKind::Continuous).then(Box::default),
@@ -213,7 +217,7 @@ impl Planner {
         if !self.findings.is_empty() {
             return Some(self.findings.remove(0));
         }
-        std::mem::take(&mut self.published).warning()
+        std::mem::take(&mut self.published).warning().or_else(|| std::mem::take(&mut self.crept).warning())
     }
 
     /// The next piece of the path. An alarm if its motion has no speed that every axis allows: the piece is then not taken (of a
@@ -359,6 +363,9 @@ impl Planner {
         }
         if self.continuous.is_some() && !matches!(front.motion, Motion::Flows(_)) {
             self.stand_by(&front.path, &law);
+        }
+        if matches!((&front.motion, &front.path.contour.kind), (Motion::Moves { .. }, PieceKind::Blend(..))) {
+            self.crept.crossed(&self.rules.of(&front.path.contour.modes), &front.path, law.duration_s());
         }
         self.actions.pass(&front.path);
         let start_s = self.elapsed_s;

@@ -3,6 +3,7 @@
 mod blocked;
 mod circular_contours;
 mod continuous;
+mod crept;
 mod curves;
 mod interpolator;
 mod overrides;
