@@ -126,16 +126,23 @@ impl Run {
             let Some(setpoint) = &kernel.output().setpoint else { return Err("a cycle without set-point".into()) };
             rows.push(Row::new(setpoint));
         }
-        if let Some(alarm) = kernel.take_findings().alarm {
+        let findings = kernel.take_findings();
+        if let Some(alarm) = findings.alarm {
             return Err(alarm.render(false));
         }
-        let summary = RunSummary::new(machine, "proof.mpf", kernel.figures(), false);
+        let mut summary = RunSummary::new(machine, "proof.mpf", kernel.figures(), false);
+        summary.add_warnings(&findings.warnings);
         let (targets, pieces) = prepared(machine, text)?;
         let kinematics = Kinematics::new(machine);
         let paths: Vec<JointPath> = pieces.into_iter().map(|piece| kinematics.to_joint(piece)).collect();
         let (stretches, joints) = path(&paths);
         let t_s = machine.cycle.time_base.setpoint_period_s();
         Ok(Self { rows, targets, stretches, joints, summary: Some(summary), t_s })
+    }
+
+    /// A warning with this code was given.
+    pub fn warns(&self, code: &str) -> bool {
+        self.summary.as_ref().is_some_and(|summary| summary.warnings.iter().any(|warning| warning.code == code))
     }
 
     /// N t_s.

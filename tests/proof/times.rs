@@ -5,10 +5,37 @@ use crate::random::Random;
 use crate::run::Run;
 use crate::settings::{Law, Settings};
 use crate::verdict::{Finding, Kind};
+use sollwert::machine::Machine;
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 /// A window that is longer than every stopping distance here.
 const WINDOW_BLOCKS: u32 = 2000;
+
+/// A program in that window.
+pub struct Wide<'a> {
+    settings: Settings,
+    program: &'a Program,
+    machine: Arc<Machine>,
+    run: OnceCell<Option<Run>>,
+}
+
+impl<'a> Wide<'a> {
+    pub fn new(settings: &Settings, program: &'a Program) -> Self {
+        let settings = Settings { look_ahead_blocks: WINDOW_BLOCKS, ..settings.clone() };
+        let machine = Arc::new(settings.machine());
+        Self { settings, program, machine, run: OnceCell::new() }
+    }
+
+    fn of(&self, text: &str) -> Option<Run> {
+        Run::new(&self.machine, text).ok()
+    }
+
+    /// The program itself. `None`: it is no program.
+    fn run(&self) -> Option<&Run> {
+        self.run.get_or_init(|| self.of(&self.program.text(&self.settings))).as_ref()
+    }
+}
 
 /// What times may differ by, of the time, and in cycles: two runs end between two cycles each, and so does the approach.
 const REVERSED_RATIO: f64 = 0.005;
@@ -23,15 +50,13 @@ const BLEND_RATIO: f64 = 1e-3;
 
 /// The reversed path takes as long. `None`: it does, or there is no such path. Under `seven-phase` a ramp ends where a block ends, and a
 /// backward pass is not the mirror of a forward one: nothing is promised.
-pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
+pub fn reversed(wide: &Wide<'_>) -> Option<Finding> {
+    let settings = &wide.settings;
     if settings.law == Law::SevenPhase {
         return None;
     }
-    let settings = Settings { look_ahead_blocks: WINDOW_BLOCKS, ..settings.clone() };
-    let machine = Arc::new(settings.machine());
-    let [there, approach, back] = texts(&settings, program)?;
-    let time = |text: &str| Run::new(&machine, text).ok().map(|run| (run.cycle_time_s(), run));
-    let ((there_s, first), (back_s, second), (approach_s, third)) = (time(&there)?, time(&back)?, time(&approach)?);
+    let [_, approach, back] = texts(settings, wide.program)?;
+    let (first, second, third) = (wide.run()?, wide.of(&back)?, wide.of(&approach)?);
     // Rounding of points may make a corner, or take one away: at a hair of a line between an arc and its tangent, for one.
     let (blends, mirrored) = (first.blends_lu(), second.blends_lu());
     let alike = |(a, b): (&f64, &f64)| (a - b).abs() <= BLEND_RATIO * a.max(*b);
@@ -43,7 +68,8 @@ pub fn reversed(settings: &Settings, program: &Program) -> Option<Finding> {
     if !same_path {
         return None;
     }
-    let back_s = back_s - approach_s;
+    let there_s = first.cycle_time_s();
+    let back_s = second.cycle_time_s() - third.cycle_time_s();
     let allowed = REVERSED_RATIO * there_s + REVERSED_CYCLES * first.t_s;
     let ratio = (there_s - back_s).abs() / allowed;
     let text = format!("{there_s:.6} s, reversed {back_s:.6} s ({:+.3} %)", 100.0 * (back_s / there_s - 1.0));
@@ -62,10 +88,14 @@ pub fn texts(settings: &Settings, program: &Program) -> Option<[String; 3]> {
     Some([there, approach, back])
 }
 
-/// The path goes on: with exact stops for its corners, and without a compressor, it would not take a third of the time. `None`: so it is, or that is no program. `seven-phase`
-/// drives a piece at the speed of its worst place, and promises nothing.
-pub fn crept(settings: &Settings, program: &Program, time_s: f64) -> Option<Finding> {
-    if settings.law == Law::SevenPhase {
+/// The path goes on: with exact stops for its corners, and without a compressor, it would not take a third of the time. `None`: so it is, or that is no program.
+/// `seven-phase` drives a blend at the speed of its worst place, and promises nothing but that it says so.
+pub fn crept(settings: &Settings, program: &Program, run: &Run) -> Option<Finding> {
+    let time_s = run.cycle_time_s();
+    // At F alone a path with stops takes as long as one without: it is the longer one.
+    let feed_s = run.summary.as_ref().map_or(0.0, |summary| summary.cam_time_s);
+    let tells = settings.law == Law::SevenPhase && run.warns(CREEPS);
+    if tells || time_s <= CREPT_RATIO * feed_s {
         return None;
     }
     let machine = Arc::new(settings.machine());
@@ -79,8 +109,12 @@ pub fn crept(settings: &Settings, program: &Program, time_s: f64) -> Option<Find
 const CREPT_RATIO: f64 = 3.0;
 const CREPT_MIN_S: f64 = 0.1;
 
+/// The code of the warning.
+const CREEPS: &str = "P0010";
+
 /// A line in two is the same motion. `None`: it is, or there is no line to split, or the split changes the path.
-pub fn split(settings: &Settings, program: &Program, random: &mut Random) -> Option<Finding> {
+pub fn split(wide: &Wide<'_>, random: &mut Random) -> Option<Finding> {
+    let Wide { settings, program, .. } = wide;
     // A compressor makes another curve of another point.
     if settings.law != Law::Continuous || program.compresses() {
         return None;
@@ -89,16 +123,13 @@ pub fn split(settings: &Settings, program: &Program, random: &mut Random) -> Opt
         (0..program.blocks.len()).filter(|index| matches!(program.blocks[*index], Block::Motion { .. })).collect();
     let index = *lines.get(random.below(lines.len().max(1) as u32) as usize)?;
     let parted = program.split(index, random.between(0.25, 0.75))?;
-    let settings = Settings { look_ahead_blocks: WINDOW_BLOCKS, ..settings.clone() };
-    let machine = Arc::new(settings.machine());
-    let runs = [program, &parted].map(|program| Run::new(&machine, &program.text(&settings)).ok());
-    let [Some(whole), Some(parts)] = runs else { return None };
+    let (whole, parts) = (wide.run()?, wide.of(&parted.text(settings))?);
     // A block that ends in a stop, or a corner whose blend takes half of a block, is another path when the block is in two.
     let same_path = whole.is_like(&parts) && (whole.path_length_lu() - parts.path_length_lu()).abs() < 1e-7;
     if !same_path {
         return None;
     }
-    let [whole_s, parts_s] = [&whole, &parts].map(Run::cycle_time_s);
+    let [whole_s, parts_s] = [whole, &parts].map(Run::cycle_time_s);
     let allowed = SPLIT_RATIO * whole_s + 1.5 * whole.t_s;
     let ratio = (whole_s - parts_s).abs() / allowed;
     let text = format!("{whole_s:.6} s, with block {index} in two {parts_s:.6} s");
