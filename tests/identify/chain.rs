@@ -110,7 +110,8 @@ fn every_shipped_machine_gets_programs_that_run() {
             };
             let outcome = run(options, &mut |_| {}).unwrap_or_else(|error| panic!("{}", error.0.render(false)));
             assert!(outcome.alarm.is_none(), "{name} {}: {}", program.name, outcome.alarm.unwrap().render(false));
-            let errors = outcome.warnings.iter().filter(|warning| !matches!(warning.code, "D0002" | "K0002"));
+            // Corners that all but turn back are part of what a control is to show.
+            let errors = outcome.warnings.iter().filter(|warning| !matches!(warning.code, "D0002" | "K0002" | "P0010"));
             assert_eq!(
                 errors.map(|w| w.message.as_str()).collect::<Vec<_>>(),
                 Vec::<&str>::new(),
