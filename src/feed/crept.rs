@@ -4,10 +4,15 @@
 //! (models/local-smoothing.md section 3), and where the path almost turns back that is next to nothing: the radius goes with the square of the cosine of half the
 //! turning angle. Does not plan.
 
+use super::junction::STOP;
 use super::limits::{AxisRules, FeedCap};
-use crate::base::{Diagnostic, Portable};
+use super::profile::{Bounds, SpeedCap, Stretch, seven_phases};
+use super::ramp::Dynamics;
+use super::{Limit, LimitKind};
+use crate::base::Diagnostic;
 use crate::geometry::Curve;
 use crate::kinematics::JointPath;
+use crate::machine::AxisLimits;
 use crate::program::BlockRef;
 
 /// So many times the time of a stop, and so much more than it, are worth telling.
@@ -63,19 +68,26 @@ impl Crept {
     }
 }
 
-/// Not less than a stop half way takes: from rest to rest over each half with half of what the direction at the start allows: the path turns, and each side of
-/// a corner has its own direction.
+/// A stop half way, about: from rest to rest over each half, along the direction at its end of the blend.
 fn stop_s(rules: &AxisRules, path: &JointPath, curve: &Curve) -> f64 {
-    let half_lu = 0.5 * curve.length_lu();
-    let first = path.at(0.0).first;
-    let acceleration = rules.largest(|axis, limits| first[axis].abs() / limits.acceleration_max_lu_s2);
-    let jerk = rules.largest(|axis, limits| first[axis].abs() / limits.jerk_max_lu_s3);
-    let (acceleration_lu_s2, jerk_lu_s3) = (0.5 / acceleration.demand_ratio, 0.5 / jerk.demand_ratio);
-    let feed_lu_s = match rules.feed_cap(&path.contour.feed, curve) {
+    let limit = Limit { kind: LimitKind::LookAhead, axis: None };
+    let velocity_lu_s = match rules.feed_cap(&path.contour.feed, curve) {
         FeedCap::Programmed(cap) => cap.velocity_lu_s,
         FeedCap::Rapid => f64::INFINITY,
     };
-    // Four phases of constant jerk, two of constant acceleration, and the feed all along, one after the other.
-    let by_jerk_s = if rules.jerk_limited { (32.0 * half_lu / jerk_lu_s3).portable_cbrt() } else { 0.0 };
-    2.0 * (by_jerk_s + 2.0 * (half_lu / acceleration_lu_s2).sqrt() + half_lu / feed_lu_s)
+    let half = |s_lu: f64| {
+        let first = path.at(s_lu).first;
+        let least = |of: fn(&AxisLimits) -> f64| {
+            1.0 / rules.largest(|axis, limits| first[axis].abs() / of(limits)).demand_ratio
+        };
+        let dynamics = Dynamics {
+            acceleration_lu_s2: least(|limits| limits.acceleration_max_lu_s2),
+            jerk_lu_s3: rules.jerk_limited.then(|| least(|limits| limits.jerk_max_lu_s3)),
+        };
+        let velocity_lu_s = velocity_lu_s.min(least(|limits| limits.velocity_max_lu_s));
+        let cruise = SpeedCap { velocity_lu_s, limit };
+        let stretch = Stretch { length_lu: 0.5 * curve.length_lu(), entry: STOP, exit: STOP };
+        seven_phases(&stretch, &Bounds { cruise, dynamics, acceleration: limit, jerk: limit }).duration_s()
+    };
+    half(0.0) + half(curve.length_lu())
 }

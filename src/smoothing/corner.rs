@@ -35,7 +35,8 @@ use std::sync::Arc;
 /// Turning angles below this are rounding of programmed points: no blend and no `corners` entry.
 pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
 
-/// cos(theta/2) below which the path stops in the corner (turning angles above 178.85 deg). The smallest radius of the blend is
+/// cos(theta/2) below which the path stops in the corner (turning angles above 178.85 deg); of polynomials, which may have a cusp at other angles, their
+/// slowest place. The smallest radius of the blend is
 /// 0.6 cos² T / sin: here 6e-5 T, a few nanometres for a usual T, so that the blend cannot be told from the cusp into which it
 /// degenerates, and crossing it at the speed that its curvature allows lasts longer than the stop.
 const REVERSAL_COS_MIN: f64 = 0.01;
@@ -268,6 +269,10 @@ impl Rules {
     fn polynomial(&self, joint: &Joint<'_>, room: &Room, tolerances: &Tolerances) -> Option<Junction> {
         let pair = Pair { before: joint.before.curve, after: joint.after.curve, linear: &self.linear };
         let blend = common(&pair, room.clamped(f64::INFINITY), tolerances, |t| joint.cuts(t))?;
+        // Curves may turn back further on even where they do not in the corner.
+        if blend.slowest_ratio < REVERSAL_COS_MIN {
+            return Some(Junction::Stop);
+        }
         let [u, v] = joint.ends;
         let [along, onward] = [u.first, v.first].map(|direction| direction.masked(&self.linear));
         // The tip almost turns back: what rotary axes have to do on the way is pressed into almost no length.

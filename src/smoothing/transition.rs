@@ -31,6 +31,11 @@ const NEAR_ENOUGH_RATIO: f64 = 0.9;
 /// Kept below the tolerance for what samples may miss between them.
 const SAMPLE_RESERVE_RATIO: f64 = 0.99;
 
+/// Where a blend goes slower than this through its parameter between two samples it may be slower still; and rounds of the search there, each of which leaves
+/// two thirds.
+const SLOW_RATIO: f64 = 0.3;
+const VALLEY_ROUNDS: usize = 40;
+
 /// Axes whose T_j differ by less than this share leave their lines at one place: a stretch between, as short as rounding makes it, is no use to anyone
 /// and has a jerk of its own.
 const STRETCH_MIN_RATIO: f64 = 1e-3;
@@ -61,6 +66,8 @@ pub(super) struct Transition {
     pub length_lu: f64,
     /// Distance of its middle from the point where the curves meet, linear axes.
     pub deviation_mm: f64,
+    /// Least way over change of the parameter, of the axes whose way is that of the path: 1 at the ends, 0 in a cusp, cos(theta/2) between two lines.
+    pub slowest_ratio: f64,
 }
 
 /// Two curves that meet.
@@ -84,6 +91,11 @@ impl Tolerances {
 }
 
 impl Pair<'_> {
+    /// The axes whose way is that of the path.
+    fn counted(&self) -> PerAxis<bool> {
+        if self.before.rotary_only() { self.linear.map(|linear| !linear) } else { *self.linear }
+    }
+
     /// Programmed position at s from the meeting point, negative before it.
     fn programmed(&self, s_lu: f64) -> AxisVector {
         if s_lu < 0.0 {
@@ -152,7 +164,8 @@ pub(super) fn common(
     let middle = value(&numerator_lu, t_lu) - pair.programmed(0.0);
     let piece = piece(2.0 * t_lu, numerator_lu);
     let curve = chained(vec![piece], ends(t_lu), pair.linear)?;
-    Some(Transition { curve, length_lu: t_lu, deviation_mm: middle.masked(pair.linear).norm() })
+    let slowest_ratio = slowest_ratio(&numerator_lu, 2.0 * t_lu, &pair.counted());
+    Some(Transition { curve, length_lu: t_lu, deviation_mm: middle.masked(pair.linear).norm(), slowest_ratio })
 }
 
 fn largest(pair: &Pair<'_>, t_max_lu: f64, tolerances: &Tolerances) -> Option<f64> {
@@ -228,7 +241,9 @@ pub(super) fn per_axis(
     let pieces: Vec<PolynomialPiece> = pieces.collect();
     let deviation = PerAxis::from_fn(|axis| MIDDLE_RATIO * reach[axis] * turn[axis]);
     let curve = chained(pieces, ends(t_lu), linear)?;
-    Some(Transition { curve, length_lu: t_lu, deviation_mm: deviation.masked(linear).norm() })
+    // Where the middle is every axis goes half way between its two directions.
+    let slowest_ratio = ((u + v) * 0.5).masked(linear).norm();
+    Some(Transition { curve, length_lu: t_lu, deviation_mm: deviation.masked(linear).norm(), slowest_ratio })
 }
 
 /// Every T_j that is longer than another one by no more than `near_lu` as long as that one: no axis deviates by more than before.
@@ -294,6 +309,26 @@ fn bends(c: &[AxisVector; 6], u: f64) -> [AxisVector; 2] {
     let second = c[2] * 2.0 + (c[3] * 6.0 + (c[4] * 12.0 + c[5] * (20.0 * u)) * u) * u;
     let third = c[3] * 6.0 + (c[4] * 24.0 + c[5] * (60.0 * u)) * u;
     [second, third]
+}
+
+/// The least |p'| on \[0, h\]: of samples and, where the curve is slow, of the valleys between them, whose square is about a parabola.
+fn slowest_ratio(c: &[AxisVector; 6], h: f64, counted: &PerAxis<bool>) -> f64 {
+    let speed_ratio = |u: f64| {
+        let slope = c[1] + (c[2] * 2.0 + (c[3] * 3.0 + (c[4] * 4.0 + c[5] * (5.0 * u)) * u) * u) * u;
+        slope.masked(counted).norm()
+    };
+    let step = h / SAMPLES as f64;
+    let samples: [f64; SAMPLES + 1] = std::array::from_fn(|i| speed_ratio(step * i as f64));
+    let mut slowest = samples.iter().copied().fold(f64::INFINITY, f64::min);
+    for i in (1..SAMPLES).filter(|i| samples[*i] < SLOW_RATIO && samples[*i] <= samples[i - 1].min(samples[i + 1])) {
+        let (mut low, mut high) = (step * (i - 1) as f64, step * (i + 1) as f64);
+        for _ in 0..VALLEY_ROUNDS {
+            let [left, right] = [low + (high - low) / 3.0, high - (high - low) / 3.0];
+            if speed_ratio(left) < speed_ratio(right) { high = right } else { low = left }
+        }
+        slowest = slowest.min(speed_ratio(0.5 * (low + high)));
+    }
+    slowest
 }
 
 /// Coefficients of p(u + by).

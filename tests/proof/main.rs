@@ -9,6 +9,7 @@
 //! cargo test --test proof                                              300 programs for each time law
 //! PROOF_PROGRAMS=100000 cargo test --release --test proof              the nightly run
 //! PROOF_FIRST=4711 PROOF_PROGRAMS=1 cargo test --test proof            one seed again
+//! PROOF_SHOW=1 ...                                                     programs and machines before they are judged
 //! ```
 
 mod axes;
@@ -164,8 +165,12 @@ impl Proof<'_> {
 }
 
 fn prove(law: Law) {
+    let shows = std::env::var_os("PROOF_SHOW").is_some();
     let judged = |seed| {
         let (settings, program, random) = case(seed, law);
+        if shows {
+            println!("seed {seed}:\n{}---\n{}---", program.text(&settings), settings.text());
+        }
         judged(&settings, &program, Some(random))
     };
     let print = |seed, kind| {

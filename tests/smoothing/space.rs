@@ -278,3 +278,22 @@ fn a_blend_that_takes_longer_than_a_stop_is_none() {
         assert_eq!(kinds(&run(&control(shape), &moves).0), "lbl|", "{shape:?}");
     }
 }
+
+/// An arc that runs into a line turns back further on, where it does not in the corner (178.3 deg): the blend has a cusp, and the path stops. A few micrometres beside it there is none.
+#[test]
+fn a_blend_with_a_cusp_is_none() {
+    for shape in [BlendShape::Hermite3, BlendShape::Quintic] {
+        for (beside_mm, wanted) in [(-5e-3, "bl|"), (0.0, "|l|"), (2e-3, "bl|")] {
+            let (centre_mm, start) = ([-1.137_45, 2.653_044], [-0.9823, 2.7093]);
+            let end = [-1.145_854, 2.488_231];
+            let mut moves = vec![line(1, &start), line(2, &end), line(3, &[-1.199_154, 2.492_531 + beside_mm])];
+            let angle = |p: [f64; 2]| (p[1] - centre_mm[1]).atan2(p[0] - centre_mm[0]);
+            let sweep_rad = (angle(end) - angle(start)).rem_euclid(std::f64::consts::TAU);
+            let radius_mm = f64::hypot(end[0] - centre_mm[0], end[1] - centre_mm[1]);
+            moves[1].kind = MoveKind::Arc(ArcGeometry { plane: [X, Y], centre_mm, radius_mm, sweep_rad });
+            moves.iter_mut().for_each(|moved| moved.modes.contour_tolerance_mm = Some(0.045));
+            let kinds = kinds(&run(&control(shape), &moves).0);
+            assert!(kinds.ends_with(wanted), "{shape:?}, {beside_mm} mm beside it: {kinds}");
+        }
+    }
+}
