@@ -213,3 +213,22 @@ fn a_blend_that_all_but_turns_back_is_not_crept_along() {
     let stops_s = total_s(&stops.planned(&machine));
     assert!(time_s < stops_s, "{time_s} s, with exact stops {stops_s} s");
 }
+
+/// Where the window ends in a hair of a line between two blends the path still brakes for its end over all that is before it: it went from 50 mm/s to a stop in the
+/// middle of an arc of chords, for a window of several times the way that it takes.
+#[test]
+fn a_window_that_ends_in_next_to_nothing_stops_nobody() {
+    let time_s = |chord_mm: f64, radius_mm: f64, blocks: usize| {
+        let mut program = Program::new(PathMode::G642, 3000.0);
+        for i in 1..=20 {
+            let turned = f64::from(i) * chord_mm / radius_mm;
+            let rounded = |mm: f64| (mm * 1e4).round() / 1e4;
+            program.line(&[rounded(radius_mm * turned.sin()), rounded(radius_mm * (1.0 - turned.cos()))]);
+        }
+        total_s(&program.planned(&Machine { look_ahead_blocks: blocks, ..machine() }))
+    };
+    for (chord_mm, radius_mm, blocks, slower_max_ratio) in [(0.2, 50.0, 8, 1.15), (2.0, 100.0, 10, 1.005)] {
+        let (short_s, long_s) = (time_s(chord_mm, radius_mm, blocks), time_s(chord_mm, radius_mm, 2 * blocks));
+        assert!(short_s < slower_max_ratio * long_s, "{chord_mm} mm: {short_s} s, with a longer window {long_s} s");
+    }
+}

@@ -264,11 +264,15 @@ impl Planning {
             self.estimate[0] = point.speed_squared_lu2_s2;
             hinted = hinted.max(1);
         }
-        let mut pace = Pace::default();
+        let mut pace = match start {
+            _ if hinted > 1 => Pace::default(),
+            Start::Rest => Pace::from_rest(&intervals[0], self.estimate[0]),
+            Start::At(point) => Pace::moving(point.slope_lu_s2),
+        };
         for k in hinted.max(1)..=count {
             self.estimate[k] = pace.next(&intervals[first + k - 1], self.estimate[k - 1], self.estimate[k]);
         }
-        let mut pace = Pace::default();
+        let mut pace = Pace::from_rest(&intervals[last], self.estimate[count]);
         for k in (hinted..count).rev() {
             self.estimate[k] = pace.next(&intervals[first + k], self.estimate[k + 1], self.estimate[k]);
         }

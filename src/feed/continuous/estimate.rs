@@ -17,6 +17,16 @@ pub(super) struct Pace {
 }
 
 impl Pace {
+    /// Goes on from the moving end of the interval of a start, with b there; backwards from that of a stop.
+    pub fn from_rest(interval: &Interval, b_lu2_s2: f64) -> Self {
+        Self { acceleration: 0.5 * ray_exponent(interval) * b_lu2_s2 / interval.length_lu() }
+    }
+
+    /// Goes on from a state that moves.
+    pub fn moving(slope_lu_s2: f64) -> Self {
+        Self { acceleration: 0.5 * slope_lu_s2.max(0.0) }
+    }
+
     /// b at the far end of an interval if it is `from` at the near one, at most `cap`.
     pub fn next(&mut self, interval: &Interval, from_lu2_s2: f64, cap_lu2_s2: f64) -> f64 {
         let (from, cap) = (from_lu2_s2, cap_lu2_s2);

@@ -14,6 +14,11 @@ use std::ops::Range;
 /// Where a plan begins or ends at rest in the middle of a path, its first and last interval are cut like this.
 const CUTS_RATIO: [f64; 5] = [0.0, 0.08, 0.2, 0.5, 1.0];
 
+/// An interval is at most so many times as long as the way from it to the stop, as those of [`CUTS_RATIO`] are; it is cut if it is longer by more than the
+/// slack.
+const GRADE_RATIO: f64 = 1.5;
+const GRADE_SLACK_RATIO: f64 = 1.5;
+
 /// One piece of so many is handed out at least before the next plan.
 const STALE_PIECES: usize = 20;
 
@@ -146,9 +151,33 @@ impl Layout {
         }
     }
 
+    /// Cuts what is long beside its way to the stop at the end, which may lie in a piece that is next to nothing: the speed comes down over all of it, and in
+    /// one interval it cannot. The first `known` pieces stay as they are.
+    pub fn grade_stop(&mut self, known: usize, pieces: &[Piece<'_>]) {
+        let first = self.places.get(known).map_or(usize::MAX, |place| place.intervals.start);
+        let (mut way_lu, mut index) = (0.0, self.chain.intervals.len());
+        while index > first {
+            let length_lu = self.chain.intervals[index - 1].length_lu();
+            let part_lu = GRADE_RATIO * way_lu;
+            if way_lu > 0.0 && length_lu > GRADE_SLACK_RATIO * part_lu && self.is_whole(index - 1) {
+                self.split(index - 1, length_lu - part_lu, pieces);
+                self.uncut = self.uncut.min(index - 1);
+                way_lu += part_lu;
+            } else {
+                way_lu += length_lu;
+                index -= 1;
+            }
+        }
+    }
+
+    /// No pieces share the interval.
+    fn is_whole(&self, index: usize) -> bool {
+        !self.places.iter().any(|place| place.part_lu.is_some() && place.intervals.start == index)
+    }
+
     /// Cuts an interval in two, `way_lu` from its start; not if pieces share it.
     pub fn split(&mut self, index: usize, way_lu: f64, pieces: &[Piece<'_>]) {
-        if self.places.iter().any(|place| place.part_lu.is_some() && place.intervals.start == index) {
+        if !self.is_whole(index) {
             return;
         }
         let interval = &self.chain.intervals[index];

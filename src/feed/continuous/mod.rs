@@ -11,6 +11,7 @@ mod along;
 mod chain;
 mod change;
 mod estimate;
+mod further;
 mod grid;
 mod group;
 mod held;
@@ -339,6 +340,9 @@ impl Continuous {
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
         layout.entry = entry;
         layout.extend(&pieces[..count], known, stretches, start == Start::Rest);
+        if !pieces[..count].last().is_some_and(|last| last.rests_after) {
+            layout.grade_stop(known, pieces);
+        }
         if self.regime.from_lu > 0.0 && known == 0 {
             layout.frees_start();
         }
@@ -381,7 +385,8 @@ impl Continuous {
         if planned.is_some() || points.len() <= fast {
             return planned;
         }
-        self.planning.plan(chain, start, &points, &look)
+        let further = self.stop_further_on(chain);
+        self.planning.plan(chain, start, &further, &look).or_else(|| self.planning.plan(chain, start, &points, &look))
     }
 
     /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
