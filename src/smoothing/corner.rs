@@ -32,8 +32,14 @@ use crate::interpreter::{Feed, Modes, ThreadCoupling};
 use crate::machine::{BlendShape, Machine, PathMode, SmoothingSettings};
 use std::sync::Arc;
 
-/// Turning angles below this are rounding of programmed points: no blend and no `corners` entry.
+/// Turning angles of the linear axes (where only rotary axes move, theirs) below this are rounding of programmed points: no blend and
+/// no `corners` entry.
 pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
+
+/// A rotary axis that goes along steps in dq/ds by no more than this over the shorter block where its points are a straight line but for rounding to
+/// 0.001 deg: half of it in the corner on either side, and half of it at the far ends. A slope has no angle: what a step is worth does not
+/// depend on 1 rad and 1 mm being alike.
+const ROTARY_ROUNDING_RAD: f64 = 2e-3 * std::f64::consts::PI / 180.0;
 
 /// cos(theta/2) below which the path stops in the corner (turning angles above 178.85 deg); of polynomials, which may have a cusp at other angles, their
 /// slowest place. The smallest radius of the blend is
@@ -131,8 +137,8 @@ impl Rules {
         let half_lu = 0.5 * before.curve.length_lu().min(after.curve.length_lu());
         let room = Room { half_lu, free_lu };
         let mut joint = Joint { before, after, ends: [&u, &v], angle_rad, room, left_share: 1.0 };
-        // A NaN is no corner.
-        let turns = angle_rad >= CORNER_ANGLE_MIN_RAD;
+        let shorter_lu = 2.0 * half_lu;
+        let turns = is_corner([&u.first, &v.first], before.curve.rotary_only(), shorter_lu, &self.linear);
         if !turns && mode != PathMode::G645 {
             return Junction::Pass;
         }
@@ -469,6 +475,23 @@ impl Joint<'_> {
         };
         [start, end]
     }
+}
+
+/// The path has a corner between two directions, where the shorter of the two curves is that long. The same in both senses.
+pub(super) fn is_corner(
+    [u, v]: [&AxisVector; 2],
+    rotary_only: bool,
+    shorter_lu: f64,
+    linear: &PerAxis<bool>,
+) -> bool {
+    let rotary = linear.map(|is| !is);
+    let counted = if rotary_only { &rotary } else { linear };
+    // A NaN is no corner.
+    if turning_angle(&u.masked(counted), &v.masked(counted)) >= CORNER_ANGLE_MIN_RAD {
+        return true;
+    }
+    let along = (*v - *u).masked(&rotary);
+    !rotary_only && along.as_slice().iter().any(|step| step.abs() * shorter_lu > ROTARY_ROUNDING_RAD)
 }
 
 /// Angle between two directions of any length: 2 atan2(|V - U|, |V + U|), exact near 0 and near 180 deg.
