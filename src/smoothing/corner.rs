@@ -36,10 +36,10 @@ use std::sync::Arc;
 /// no `corners` entry.
 pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
 
-/// A rotary axis that goes along steps in dq/ds by no more than this over the shorter block where its points are a straight line but for rounding to
-/// 0.001 deg: half of it in the corner on either side, and half of it at the far ends. A slope has no angle: what a step is worth does not
-/// depend on 1 rad and 1 mm being alike.
-const ROTARY_ROUNDING_RAD: f64 = 2e-3 * std::f64::consts::PI / 180.0;
+/// Steps of dq/ds of a rotary axis that goes along, times the length of the shorter block: up to this they are rounding of programmed points. Points of a
+/// straight line, rounded to 0.001 deg, make steps of 0.002 deg; the rest is for lengths that are rounded as well. A slope is no angle:
+/// how much of a turn it makes would hang on 1 rad and 1 mm being alike.
+const ROTARY_ROUNDING_RAD: f64 = 3e-3 * std::f64::consts::PI / 180.0;
 
 /// cos(theta/2) below which the path stops in the corner (turning angles above 178.85 deg); of polynomials, which may have a cusp at other angles, their
 /// slowest place. The smallest radius of the blend is
@@ -161,10 +161,11 @@ impl Rules {
 
     fn corner(&self, joint: &Joint<'_>) -> Junction {
         let (before, after, [u, v]) = (joint.before, joint.after, joint.ends);
-        // A tolerance or distance of 0 is G64.
+        // A tolerance or distance of 0 is G64; of a tolerance it is said. A NaN is 0 by 0: no turn, and no tolerance for it.
         let wanted = self.wanted_lu(joint, &u.first, &v.first) > 0.0;
         if !wanted {
-            return Junction::Pass;
+            let by_distance = before.modes.path_mode == PathMode::G641;
+            return if by_distance { Junction::Pass } else { Junction::Unrounded };
         }
         if self.turns_back(before.curve, &u.first, &v.first) {
             return Junction::Stop;
@@ -478,12 +479,7 @@ impl Joint<'_> {
 }
 
 /// The path has a corner between two directions, where the shorter of the two curves is that long. The same in both senses.
-pub(super) fn is_corner(
-    [u, v]: [&AxisVector; 2],
-    rotary_only: bool,
-    shorter_lu: f64,
-    linear: &PerAxis<bool>,
-) -> bool {
+pub(super) fn is_corner([u, v]: [&AxisVector; 2], rotary_only: bool, shorter_lu: f64, linear: &PerAxis<bool>) -> bool {
     let rotary = linear.map(|is| !is);
     let counted = if rotary_only { &rotary } else { linear };
     // A NaN is no corner.
