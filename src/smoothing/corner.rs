@@ -32,8 +32,14 @@ use crate::interpreter::{Feed, Modes, ThreadCoupling};
 use crate::machine::{BlendShape, Machine, PathMode, SmoothingSettings};
 use std::sync::Arc;
 
-/// Turning angles below this are rounding of programmed points: no blend and no `corners` entry.
+/// Turning angles of the linear axes (where only rotary axes move, theirs) below this are rounding of programmed points: no blend and
+/// no `corners` entry.
 pub(super) const CORNER_ANGLE_MIN_RAD: f64 = 1e-3;
+
+/// Steps of dq/ds of a rotary axis that goes along, times the length of the shorter block: up to this they are rounding of programmed points. Points of a
+/// straight line, rounded to 0.001 deg, make steps of 0.002 deg; the rest is for lengths that are rounded as well. A slope is no angle:
+/// how much of a turn it makes would hang on 1 rad and 1 mm being alike.
+const ROTARY_ROUNDING_RAD: f64 = 3e-3 * std::f64::consts::PI / 180.0;
 
 /// cos(theta/2) below which the path stops in the corner (turning angles above 178.85 deg); of polynomials, which may have a cusp at other angles, their
 /// slowest place. The smallest radius of the blend is
@@ -131,8 +137,8 @@ impl Rules {
         let half_lu = 0.5 * before.curve.length_lu().min(after.curve.length_lu());
         let room = Room { half_lu, free_lu };
         let mut joint = Joint { before, after, ends: [&u, &v], angle_rad, room, left_share: 1.0 };
-        // A NaN is no corner.
-        let turns = angle_rad >= CORNER_ANGLE_MIN_RAD;
+        let shorter_lu = 2.0 * half_lu;
+        let turns = is_corner([&u.first, &v.first], before.curve.rotary_only(), shorter_lu, &self.linear);
         if !turns && mode != PathMode::G645 {
             return Junction::Pass;
         }
@@ -155,10 +161,11 @@ impl Rules {
 
     fn corner(&self, joint: &Joint<'_>) -> Junction {
         let (before, after, [u, v]) = (joint.before, joint.after, joint.ends);
-        // A tolerance or distance of 0 is G64.
+        // A tolerance or distance of 0 is G64; of a tolerance it is said. A NaN is 0 by 0: no turn, and no tolerance for it.
         let wanted = self.wanted_lu(joint, &u.first, &v.first) > 0.0;
         if !wanted {
-            return Junction::Pass;
+            let by_distance = before.modes.path_mode == PathMode::G641;
+            return if by_distance { Junction::Pass } else { Junction::Unrounded };
         }
         if self.turns_back(before.curve, &u.first, &v.first) {
             return Junction::Stop;
@@ -469,6 +476,18 @@ impl Joint<'_> {
         };
         [start, end]
     }
+}
+
+/// The path has a corner between two directions, where the shorter of the two curves is that long. The same in both senses.
+pub(super) fn is_corner([u, v]: [&AxisVector; 2], rotary_only: bool, shorter_lu: f64, linear: &PerAxis<bool>) -> bool {
+    let rotary = linear.map(|is| !is);
+    let counted = if rotary_only { &rotary } else { linear };
+    // A NaN is no corner.
+    if turning_angle(&u.masked(counted), &v.masked(counted)) >= CORNER_ANGLE_MIN_RAD {
+        return true;
+    }
+    let along = (*v - *u).masked(&rotary);
+    !rotary_only && along.as_slice().iter().any(|step| step.abs() * shorter_lu > ROTARY_ROUNDING_RAD)
 }
 
 /// Angle between two directions of any length: 2 atan2(|V - U|, |V + U|), exact near 0 and near 180 deg.

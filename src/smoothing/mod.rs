@@ -4,6 +4,7 @@
 
 mod compressor;
 mod corner;
+mod curve_corners;
 mod dynamics;
 mod insert;
 mod opened;

@@ -2,7 +2,7 @@
 //!
 //! In: [`Move`]s in order, pushed. Out: [`ContourPiece`]s in order: every motion block once (cut where blends take its ends), the
 //! blends, the waits. On its way a block passes three stages: what RND and CHF put between blocks (`insert`), the compressor
-//! (`compressor`), the junctions (`corner`). One motion block is held back, because the next one decides how it ends, and more where
+//! (`compressor`), the junctions (`corner`; `curve_corners` inside a block). One motion block is held back, because the next one decides how it ends, and more where
 //! a corner is to be filled or blocks are compressed. Events of blocks without motion go to the next block; where none follows, to a
 //! wait at the end.
 //!
@@ -13,6 +13,7 @@
 
 use super::compressor::Compression;
 use super::corner::{Junction, Rules, Side};
+use super::curve_corners;
 use super::insert::{Inserted, Omitted, inserted};
 use super::programmed::{positioned, programmed};
 use super::unrounded::{Reason, Unrounded};
@@ -54,6 +55,8 @@ pub(super) struct Held {
     pub programmed: Option<Box<Curve>>,
     /// Taken from its start by a blend.
     pub head_lu: f64,
+    /// Length of the block that it is a part of.
+    pub part_of_lu: Option<f64>,
     pub head: Head,
 }
 
@@ -220,7 +223,7 @@ impl Smoother {
         }
         self.position = next.end;
         let corner = next.corner.take();
-        let mut held = Held { curve, programmed: None, head_lu: 0.0, head: self.head(next, 1) };
+        let mut held = Held { curve, programmed: None, head_lu: 0.0, part_of_lu: None, head: self.head(next, 1) };
         if let Some(waiting) = self.waiting.take()
             && !self.fill_corner(waiting, &mut held, corner.is_some(), out)
         {
@@ -280,7 +283,7 @@ impl Smoother {
             before.curve = before.curve.trimmed(0.0, left_lu);
             self.compress(before, out);
         }
-        self.compress(Held { curve, programmed: None, head_lu: 0.0, head }, out);
+        self.compress(Held { curve, programmed: None, head_lu: 0.0, part_of_lu: None, head }, out);
         let remains = after.curve.length_lu() - head_lu >= DISPLACEMENT_MIN_LU;
         if remains {
             after.curve = after.curve.trimmed(head_lu, f64::INFINITY);
@@ -316,9 +319,16 @@ impl Smoother {
     }
 
     /// The next block as it is driven, but for its ends.
-    fn link(&mut self, mut held: Held, out: &mut impl FnMut(ContourPiece)) {
+    fn link(&mut self, block: Held, out: &mut impl FnMut(ContourPiece)) {
+        let mut parts = curve_corners::parts(block, self.rules.linear());
+        let Some(mut first) = parts.next() else { return };
+        let others: Vec<Held> = parts.collect();
         if let Some(before) = self.held.take() {
-            self.join(before, &mut held, out);
+            self.join(before, &mut first, out);
+        }
+        let mut held = first;
+        for next in others {
+            out(std::mem::replace(&mut held, next).whole(true));
         }
         self.held = Some(held);
     }
@@ -410,7 +420,7 @@ impl Smoother {
 
 impl Held {
     fn side(&self) -> Side<'_> {
-        let Self { curve, programmed, head_lu, head } = self;
+        let Self { curve, programmed, head_lu, head, .. } = self;
         Side { curve, programmed: programmed.as_deref(), head_lu: *head_lu, feed: &head.feed, modes: &head.modes }
     }
 
@@ -422,7 +432,8 @@ impl Held {
     /// The block without what blends take of it.
     fn part(self, tail_lu: f64, stop_at_end: bool) -> ContourPiece {
         let curve = self.shortened(tail_lu);
-        self.head.piece(PieceKind::Block(curve), stop_at_end)
+        let piece = self.head.piece(PieceKind::Block(curve), stop_at_end);
+        ContourPiece { block_length_lu: self.part_of_lu, ..piece }
     }
 
     fn shortened(&self, tail_lu: f64) -> Curve {

@@ -6,6 +6,7 @@ mod continuous;
 mod crept;
 mod curves;
 mod interpolator;
+mod kinks;
 mod overrides;
 mod printed_loop;
 mod profile;

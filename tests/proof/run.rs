@@ -11,7 +11,7 @@ use sollwert::interpolator::Setpoint;
 use sollwert::interpreter::{Feed, Interpreter, Modes, MoveKind};
 use sollwert::kernel::{Kernel, Preparation, RunSummary, Status};
 use sollwert::kinematics::{JointPath, Kinematics};
-use sollwert::machine::{AccelerationMode, Machine};
+use sollwert::machine::{AccelerationMode, Machine, PathMode};
 use sollwert::program::ProgramSource;
 use sollwert::smoothing::{ContourPiece, PieceKind, Smoother};
 use std::sync::Arc;
@@ -261,13 +261,16 @@ pub fn path(paths: &[JointPath]) -> (Vec<Stretch>, Vec<Joint>) {
             }
         };
         let last = curves.len() - 1;
+        // A corner inside a curve is a stop, but for G64.
+        let stops = |pair: &[Curve]| piece.modes.path_mode != PathMode::G64 && turns(&pair[0], &pair[1]);
+        let inner: Vec<bool> = curves.windows(2).map(stops).collect();
         for (n, curve) in curves.into_iter().enumerate() {
             let (length_lu, rotary_only) = (curve.length_lu(), curve.rotary_only());
             let contour = ContourPiece { kind: PieceKind::Block(curve), ..piece.clone() };
             let part = JointPath { contour, ..path.clone() };
             let at = posture(&part.at(0.0).position.0);
             stretches.push(Stretch { block, path: Some(part), at, start_mm: s_mm, length_lu, rotary_only, blend });
-            rests_after.push(n == last && piece.stop_at_end);
+            rests_after.push(if n == last { piece.stop_at_end } else { inner[n] });
             if !rotary_only {
                 s_mm += length_lu;
             }
@@ -283,6 +286,11 @@ fn smooth_parts(curve: &Curve) -> Vec<Curve> {
     borders.extend(polynomial.breaks_lu());
     borders.push(curve.length_lu());
     borders.windows(2).map(|ends| curve.trimmed(ends[0], ends[1])).collect()
+}
+
+/// The direction steps from one curve to the next by more than rounding.
+fn turns(before: &Curve, after: &Curve) -> bool {
+    (after.at(0.0).first - before.at(f64::INFINITY).first).norm() > TANGENT_RAD
 }
 
 /// Where nothing moves between two stretches that do (a block without displacement), the joint stands before the second one.

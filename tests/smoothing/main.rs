@@ -1,5 +1,6 @@
 //! Tests of the room `smoothing`: corners, inserts, path modes, compressor.
 
+mod along;
 mod compressor;
 mod compressor_kinds;
 mod five;
