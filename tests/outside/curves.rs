@@ -72,6 +72,33 @@ fn smooth_splines_keep_all_limits_across_their_blocks() {
     }
 }
 
+/// Two equal control points of a BSPLINE SD=3 leave the curvature continuous; at three the curve has a corner, where G60 rests at the
+/// border of the blocks, and a block without a way; at the end it begins or stops with a speed of the parameter of 0.
+#[test]
+fn repeated_control_points_keep_all_limits() {
+    let leg = |times: usize| "X30 Y25 Z12\n".repeat(times);
+    for name in MACHINES {
+        let machine = machine(name, &[]);
+        for (mode, times) in [("G64", 2), ("G60", 2), ("G60", 3), ("G60", 5)] {
+            let end = "X60 Y30\n".repeat(times - 1) + "G9 X60 Y30\n";
+            let text = format!(
+                "G60 G0 X0 Y0 Z10\n{mode} G1 F9000\nBSPLINE X10 Y20\n{}X45 Y-5 Z15\nX52 Y20\n{end}G60 G1 X70\nM30\n",
+                leg(times)
+            );
+            let rows = setpoints(&machine, &text);
+            within_limits(&machine, &rows, &text);
+            let nearest = |point: [f64; 3]| {
+                let away = rows.iter().map(|(_, q)| (0..3).map(|i| (q[i] - point[i]).powi(2)).sum::<f64>().sqrt());
+                away.fold(f64::INFINITY, f64::min)
+            };
+            assert!(nearest([60.0, 30.0, 15.0]) < 1e-4, "{name} {mode}, {times} times: the last point");
+            // Rests lie between two set-points. A curve of degree 3 passes a point that counts three times, and misses one that counts twice.
+            let passes = nearest([30.0, 25.0, 12.0]) < 1e-4;
+            assert_eq!(passes, times >= 3, "{name} {mode}, {times} times: {}", nearest([30.0, 25.0, 12.0]));
+        }
+    }
+}
+
 #[test]
 fn polynomials_circles_in_space_and_akima_keep_all_limits() {
     let text = "\
