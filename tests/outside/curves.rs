@@ -122,3 +122,26 @@ M30
         within_limits(&machine, &setpoints(&machine, text), text);
     }
 }
+
+/// The alarm names the axis that the program sends out of all numbers, or holds still, and no other.
+#[test]
+fn an_axis_that_cannot_is_named() {
+    let cases = [
+        ("POLY PO[X]=(2, 1EX300, -1EX300) PO[Y]=(1, 2, 3)", "P0001", "axis X"),
+        ("POLY PO[X]=(2, 1, 1) PO[Y]=(2, 1EX300, -1EX300)", "P0001", "axis Y"),
+        ("G1 X10 Y10 VELOLIM[Y]=0.000000001", "P0002", "velocity of axis Y"),
+    ];
+    for name in MACHINES {
+        for (block, code, named) in cases {
+            for law in ["continuous", "seven-phase"] {
+                let machine = machine(name, &[format!("feed.time_law={law}")]);
+                let text = format!("G1 F1000\n{block}\nM30\n");
+                let mut kernel = Kernel::new(Arc::new(machine), source(&text), false);
+                while kernel.cycle().unwrap() == Status::Running {}
+                let alarm = kernel.take_findings().alarm.expect(block);
+                assert_eq!((alarm.code, alarm.line()), (code, 2), "{name} {law}: {alarm:?}");
+                assert!(alarm.message.contains(named), "{name} {law}: {}", alarm.message);
+            }
+        }
+    }
+}
