@@ -352,6 +352,18 @@ fn a_block_of_repeated_control_points_stands() {
     let found = splines(&result);
     let stands = |i: usize| (found[i].end.0 - found[i - 1].end.0).norm() < 1e-12;
     assert_eq!((1..found.len()).map(stands).collect::<Vec<_>>(), [false, false, true, true, false, false, false]);
+    // With SD=2 two draw it there: the block of the first one ends in the corner, and that of a third one stands.
+    for times in [2, 3] {
+        let blocks: Vec<usize> = [0].into_iter().chain(vec![1; times]).chain([2, 3]).collect();
+        let blocks: Vec<[f64; 3]> = blocks.into_iter().map(|i| [POINTS[i][0], POINTS[i][1], 1.0]).collect();
+        let result = drives_polygon(2, &blocks);
+        let found = splines(&result);
+        for next in &found[1..times] {
+            near(next.end.0[X], POINTS[1][0], "the corner");
+            near(next.end.0[Y], POINTS[1][1], "the corner");
+        }
+        assert!((found[times].end.0 - found[times - 1].end.0).norm() > 1.0, "the last one leads away");
+    }
     // A block that stands at the end leaves the direction in which the curve came: along the last leg of the polygon, here X.
     let result = ok("G1 X0 Y0 F1000\nBSPLINE X10 Y10\nX20 Y0\nX30 Y0\nX30\nX30\nX30\nX30\nCT X40 Y10\nM30");
     let circle = arc(&result.moves[result.moves.len() - 2]);

@@ -123,6 +123,24 @@ M30
     }
 }
 
+/// Two equal points with SD=2 are a corner at the end of a block: G60 rests in it, and no axis steps.
+#[test]
+fn the_corner_of_a_quadratic_spline_is_the_end_of_a_block() {
+    let text = "G60 G0 X0 Y0\nG1 F9000\nBSPLINE SD=2 X10 Y20\nX30 Y25\nX30 Y25\nX45 Y-5\nX52 Y20\nG1 X70\nM30\n";
+    for name in MACHINES {
+        let machine = machine(name, &[]);
+        let t_s = machine.cycle.time_base.setpoint_period_s();
+        let rows = setpoints(&machine, text);
+        for (i, axis) in machine.axes.iter().enumerate() {
+            let accelerations = rows.windows(3).map(|q| (q[2].1[i] - 2.0 * q[1].1[i] + q[0].1[i]) / t_s.powi(2));
+            let most = accelerations.fold(0.0, |most: f64, a| most.max(a.abs()));
+            assert!(most <= axis.limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "{name} {}: {most}", axis.name);
+        }
+        let ends = rows.iter().rfind(|(line, _)| *line == 4).unwrap();
+        assert!((ends.1[0] - 30.0).hypot(ends.1[1] - 25.0) < 1e-3, "{name}: {ends:?}");
+    }
+}
+
 /// The alarm names the axis that the program sends out of all numbers, or holds still, and no other.
 #[test]
 fn an_axis_that_cannot_is_named() {
