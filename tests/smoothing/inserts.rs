@@ -234,9 +234,9 @@ fn where_the_path_ends_there_is_no_corner() {
     let functions: Vec<MoveKind> = (0..5).map(|_| MoveKind::Function { stops: false }).collect();
     let (ahead, turn): ([&[f64]; 2], [&[f64]; 2]) = ([&[10.0, 0.0], &[20.0, 0.0]], [&[10.0, 0.0], &[10.0, 10.0]]);
     assert_eq!(said(&turn, &[]), []);
-    assert_eq!(said(&turn[..1], &[stop.clone()]), []);
+    assert_eq!(said(&turn[..1], std::slice::from_ref(&stop)), []);
     assert_eq!(said(&turn[..1], &functions), []);
-    assert_eq!(said(&ahead, &[stop.clone()]), []);
+    assert_eq!(said(&ahead, std::slice::from_ref(&stop)), []);
     let turned = said(&turn, &[stop]);
     assert!(turned.len() == 1 && turned[0].0 == "S0004" && turned[0].1.contains("line 1 "), "{turned:?}");
 }
