@@ -52,6 +52,20 @@ impl ModeRules {
         blocked.next().map(|(id, _, what)| format!("axis {} has no {what}", self.machine.axis(id).name))
     }
 
+    /// The first axis that does not allow `speed_lu_s` along a path that goes on as in `state`, in words.
+    pub(super) fn slow_axis(&self, rules: &AxisRules, state: &JointState, speed_lu_s: f64) -> Option<String> {
+        let demands = self.machine.axis_ids().zip(&rules.axes).flat_map(|(id, limits)| {
+            let demand = |derivative: f64, power: i32| derivative.abs() * speed_lu_s.powi(power);
+            [
+                (id, demand(state.first[id], 1) > limits.velocity_max_lu_s, "velocity"),
+                (id, demand(state.second[id], 2) > limits.acceleration_max_lu_s2, "acceleration"),
+                (id, demand(state.third[id], 3) > limits.jerk_max_lu_s3, "jerk"),
+            ]
+        });
+        let mut slow = demands.filter(|(_, exceeded, _)| *exceeded);
+        slow.next().map(|(id, _, what)| format!("the {what} of axis {} holds it", self.machine.axis(id).name))
+    }
+
     /// The rules under `modes`.
     pub(super) fn of(&mut self, modes: &Modes) -> Arc<AxisRules> {
         if let Some((key, rules)) = &self.last

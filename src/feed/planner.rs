@@ -41,7 +41,7 @@ mod ramping_feed;
 mod with_spindle;
 mod waits;
 
-use checks::{check_flow, check_motion, check_time};
+use checks::{Axes, check_flow, check_motion, check_time};
 pub(super) use ramping_feed::Ramp;
 use waits::Waits;
 
@@ -279,19 +279,19 @@ impl Planner {
                     .map_or(STOP, |(before, before_rules)| junction::cap([before_rules, &rules], before, &ends));
                 if flows {
                     let flow = Flowing::new(rules.clone(), &path, blend, [&ends.start, &ends.end]);
-                    check_flow(&flow, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
+                    check_flow(&flow, length_lu, &path, &Axes { modes: &self.rules, rules: &rules, ends: &ends })?;
                     self.last = Some((ends, rules));
                     Motion::Flows(flow)
                 } else {
                     let limits = rules.piece(contour, curve, &ends, worst.as_ref());
-                    check_motion(&limits, length_lu, &path, self.rules.blocked_axis(&rules, &ends.start))?;
+                    check_motion(&limits, length_lu, &path, &Axes { modes: &self.rules, rules: &rules, ends: &ends })?;
                     self.last = Some((ends, rules));
                     let block_length_lu = (!blend).then_some(contour.block_length_lu.unwrap_or(length_lu));
                     Motion::Moves { limits, length_lu, block_length_lu }
                 }
             }
             PieceKind::Wait { time_s, .. } if *time_s > 0.0 => {
-                check_time(*time_s, &path)?;
+                check_time(*time_s, &path, || None)?;
                 (corner, rests_after) = (STOP, true);
                 Motion::Waits { time_s: *time_s }
             }

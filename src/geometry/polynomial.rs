@@ -16,8 +16,8 @@
 use super::CurveState;
 use super::arc_length::{ArcLengthTable, Panel};
 use super::rational::derivatives;
-use crate::base::{AxisVector, PartPoint, PerAxis};
-use crate::interpreter::PolynomialGeometry;
+use crate::base::{AxisId, AxisVector, PartPoint, PerAxis};
+use crate::interpreter::{PolynomialGeometry, PolynomialPiece};
 use std::sync::Arc;
 
 /// Directions that differ by less go on smoothly.
@@ -87,6 +87,15 @@ impl PolynomialCurve {
     /// True where no linear axis moves: lengths are then in rad.
     pub fn rotary_only(&self) -> bool {
         self.table.rotary_only()
+    }
+
+    /// The coefficients keep this axis within `most_lu` of 0, denominators apart; false where one of them is no number.
+    pub fn stays_within(&self, axis: AxisId, most_lu: f64) -> bool {
+        let reach = |piece: &PolynomialPiece| {
+            let rows = piece.numerator_lu.iter().rev();
+            rows.fold(0.0, |sum: f64, row| sum * piece.parameter_end_ratio + row[axis].abs())
+        };
+        self.table.pieces().iter().all(|piece| reach(piece) <= most_lu)
     }
 
     /// First point.

@@ -48,9 +48,13 @@ fn unit(along: AxisVector, linear: &PerAxis<bool>) -> Option<AxisVector> {
     (length_lu > WAY_MIN_LU).then(|| along * (1.0 / length_lu))
 }
 
-/// The first derivative to the parameter that is not 0, at the start or the end.
+/// The first derivative to the parameter that is not 0, at the start or the end of the pieces that move.
 fn of_polynomials(geometry: &PolynomialGeometry, at_end: bool, linear: &PerAxis<bool>) -> Option<AxisVector> {
-    let piece = if at_end { geometry.pieces.last() } else { geometry.pieces.first() }?;
+    let pieces = &geometry.pieces;
+    (0..pieces.len()).find_map(|i| of_piece(&pieces[if at_end { pieces.len() - 1 - i } else { i }], at_end, linear))
+}
+
+fn of_piece(piece: &PolynomialPiece, at_end: bool, linear: &PerAxis<bool>) -> Option<AxisVector> {
     // At a zero of the speed a little beside it tells the direction.
     [0.0, 1e-6, 1e-3].into_iter().find_map(|inside| {
         let u = piece.parameter_end_ratio * if at_end { 1.0 - inside } else { inside };

@@ -122,11 +122,11 @@ impl Interpreter {
                 self.modal.feed_modes.cutting_limit_rpm = Some(limit_rpm);
             }
             Address::Override => {
-                let ratio = percent(typed.0, 200.0, columns)?;
+                let ratio = percent("OVR", typed.0, 200.0, columns)?;
                 self.set_programmed(|limits| limits.override_ratio = ratio);
             }
             Address::RapidOverride => {
-                let ratio = percent(typed.0, 200.0, columns)?;
+                let ratio = percent("OVRRAP", typed.0, 200.0, columns)?;
                 self.set_programmed(|limits| limits.rapid_override_ratio = ratio);
             }
             Address::H => block.events.push(Event::HFunction(typed.0)),
@@ -180,21 +180,25 @@ impl Interpreter {
             return self.spindle_word(address, (spindle, &name), typed.0, columns, block);
         }
         let axis = self.axis_of(index)?;
+        let share = |most_percent| {
+            let word = format!("{}[{}]", word_of(address), self.machine.axis(axis).name);
+            percent(&word, typed.0, most_percent, columns)
+        };
         match address {
             IndexedAddress::Position | IndexedAddress::PositionAsync => {
                 let waits = address == IndexedAddress::Position;
                 return self.position_word(axis, typed, value, waits, columns, block);
             }
             IndexedAddress::Acceleration => {
-                let ratio = percent(typed.0, 200.0, columns)?;
+                let ratio = share(200.0)?;
                 self.set_programmed(|limits| limits.acceleration_ratio[axis] = ratio);
             }
             IndexedAddress::Velocity => {
-                let ratio = percent(typed.0, 100.0, columns)?;
+                let ratio = share(100.0)?;
                 self.set_programmed(|limits| limits.velocity_ratio[axis] = ratio);
             }
             IndexedAddress::Jerk => {
-                let ratio = percent(typed.0, 200.0, columns)?;
+                let ratio = share(200.0)?;
                 self.set_programmed(|limits| limits.jerk_ratio[axis] = ratio);
             }
             IndexedAddress::SynchronousLimit => {
@@ -206,7 +210,7 @@ impl Interpreter {
                 self.modal.feed_modes.positioning_feed_lu_s[axis] = Some(feed_lu_s);
             }
             IndexedAddress::AxisOverride => {
-                self.modal.feed_modes.positioning_override_ratio[axis] = percent(typed.0, 200.0, columns)?;
+                self.modal.feed_modes.positioning_override_ratio[axis] = share(200.0)?;
             }
             IndexedAddress::ReferenceRadius => {
                 let radius_mm = self.modal.position_lu(AxisKind::Linear, typed);
@@ -332,12 +336,12 @@ fn positive_feed(typed: Typed, columns: &Columns) -> Outcome<()> {
         .help("no feed moves nothing: write a feed above 0, G0 for a rapid, or M0 to stop"))
 }
 
-/// A percentage above 0, as a share.
-pub(super) fn percent(value_percent: f64, most_percent: f64, columns: &Columns) -> Outcome<f64> {
+/// A percentage above 0, as a share; `word` is what it was given to.
+pub(super) fn percent(word: &str, value_percent: f64, most_percent: f64, columns: &Columns) -> Outcome<f64> {
     if value_percent > 0.0 && value_percent <= most_percent {
         return Ok(value_percent / 100.0);
     }
-    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{value_percent} % is not possible"))
+    Err(Fault::new(codes::OUT_OF_RANGE, columns.clone(), format!("{word} of {value_percent} % is not possible"))
         .label(format!("expected more than 0 and at most {most_percent} %"))
         .help(format!("give 1 to {most_percent} %: with 0 the path would stand for ever")))
 }

@@ -116,21 +116,21 @@ impl Interpreter {
         columns: &Columns,
         block: &mut Collected,
     ) -> Outcome<()> {
-        let word = super::feed_words::word_of(address);
-        block.events.push(Event::Spindle(format!("{word}[{name}]={}", trimmed(value_percent)).into()));
+        let word = format!("{}[{name}]", super::feed_words::word_of(address));
+        block.events.push(Event::Spindle(format!("{word}={}", trimmed(value_percent)).into()));
         if spindle != SIMULATED_SPINDLE {
             self.report_unsimulated(spindle, columns);
             return Ok(());
         }
         match address {
             IndexedAddress::AxisOverride => {
-                self.modal.feed_modes.spindle_override_ratio[0] = percent(value_percent, 200.0, columns)?;
+                self.modal.feed_modes.spindle_override_ratio[0] = percent(&word, value_percent, 200.0, columns)?;
             }
             IndexedAddress::Velocity => {
-                self.modal.feed_modes.spindle_max_ratio = percent(value_percent, 100.0, columns)?;
+                self.modal.feed_modes.spindle_max_ratio = percent(&word, value_percent, 100.0, columns)?;
             }
             IndexedAddress::Acceleration => {
-                let ratio = percent(value_percent, 200.0, columns)?;
+                let ratio = percent(&word, value_percent, 200.0, columns)?;
                 block.simulated_spindle.push(Event::SpindleAcceleration { ratio });
                 return Ok(());
             }

@@ -5,8 +5,8 @@
 //! some hundred blocks (`spline`). The spline ends where a block moves in another way, or where the path stops (M0, M6, G4, STOPRE).
 //! M, S, T and H between its blocks do not end it.
 //!
-//! The first point is where the block before ended. Points that repeat the one before are no points; the first block of a BSPLINE may
-//! name its first control point in this way, to give it a weight.
+//! The first point is where the block before ended. Points of ASPLINE and CSPLINE that repeat the one before are no points. A control
+//! point of a BSPLINE counts as often as it is programmed; only its first block may name the start, to give it a weight.
 
 use super::curve_state::CurveWords;
 use super::direction::direction;
@@ -110,8 +110,8 @@ impl Interpreter {
             Some(open) => open,
             None => self.opened_spline(word, start, &linear),
         };
-        if chord_lu(&open.last.0, &end.0, &linear) == 0.0 {
-            if let (true, Points::B(spline)) = (fresh, &mut open.kind) {
+        if chord_lu(&open.last.0, &end.0, &linear) == 0.0 && (fresh || !matches!(open.kind, Points::B(_))) {
+            if let Points::B(spline) = &mut open.kind {
                 spline.weigh_start(point.weight_ratio);
             }
             self.open_spline = Some(open);
@@ -171,10 +171,14 @@ impl Interpreter {
                 _ => programmed,
             };
             waiting.end = end;
-            self.last_motion.start = std::mem::replace(&mut open.from, end);
-            if !geometry.pieces.is_empty() {
-                waiting.kind = MoveKind::Spline(geometry);
-                self.last_motion.kind = Some(waiting.kind.clone());
+            let from = std::mem::replace(&mut open.from, end);
+            if geometry.pieces.is_empty() {
+                continue;
+            }
+            waiting.kind = MoveKind::Spline(geometry);
+            // A block whose control points are all the same stands, and has no direction to go on in.
+            if direction(&waiting.kind, [&from, &end], true, &self.machine.linear_mask()).is_some() {
+                self.last_motion = LastMotion { start: from, kind: Some(waiting.kind.clone()) };
             }
         }
         if finish.is_none() {

@@ -33,6 +33,8 @@ pub struct Smoother {
     told: PartPoint,
     /// A block with RND, CHF or CHR at its end.
     waiting: Option<Waiting>,
+    /// A block with RND, CHF or CHR at whose end the path rests: whether that is a corner, the next motion tells.
+    left: Option<Waiting>,
     compression: Compression,
     held: Option<Held>,
     /// Blocks without motion that wait for the next piece; `block`, `feed` and `modes` are those of the last of them, for the
@@ -94,6 +96,7 @@ impl Smoother {
             position,
             told: position,
             waiting: None,
+            left: None,
             compression: Compression::default(),
             held: None,
             carried: None,
@@ -224,6 +227,7 @@ impl Smoother {
         self.position = next.end;
         let corner = next.corner.take();
         let mut held = Held { curve, programmed: None, head_lu: 0.0, part_of_lu: None, head: self.head(next, 1) };
+        self.tell_left_corner(&held);
         if let Some(waiting) = self.waiting.take()
             && !self.fill_corner(waiting, &mut held, corner.is_some(), out)
         {
@@ -291,11 +295,19 @@ impl Smoother {
         remains
     }
 
-    /// The corner that waits gets nothing.
+    /// The corner that waits gets nothing: the path rests in it.
     fn leave_corner(&mut self, out: &mut impl FnMut(ContourPiece)) {
-        if let Some(Waiting { held, .. }) = self.waiting.take() {
+        if let Some(waiting) = self.waiting.take() {
+            self.left = Some(waiting.clone());
+            self.compress(waiting.held, out);
+        }
+    }
+
+    /// Says that the path rests in a corner that was to be filled, if `after` makes it one.
+    fn tell_left_corner(&mut self, after: &Held) {
+        let Some(Waiting { held, insert, .. }) = self.left.take() else { return };
+        if !matches!(inserted(&held, after, &insert, false, self.rules.linear()), Err(Omitted::NoCorner)) {
             self.unrounded.report(Reason::NoInsert, held.head.block);
-            self.compress(held, out);
         }
     }
 

@@ -48,3 +48,22 @@ fn a_motion_of_many_days_is_an_alarm() {
     let Some((0, alarm)) = alarm(&spinner(), &program) else { panic!("no alarm") };
     assert!(alarm.code == "P0002" && alarm.message.contains("line 1") && alarm.help.is_some(), "{alarm:?}");
 }
+
+/// The axis whose limit makes it slow is named, and no axis where the feed does: 1 mm in 1e6 s is 1e-6 mm/s.
+#[test]
+fn an_axis_that_holds_a_motion_for_days_is_named() {
+    for time_law in [TimeLawKind::SevenPhase, TimeLawKind::Continuous] {
+        let mut machine = spinner();
+        machine.feed.time_law = time_law;
+        let program = Program::polyline(PathMode::ExactStop, 3000.0, &[[50.0, 0.0], [50.0, 20.0]]);
+        machine.axes[1].limits.velocity_max_lu_s = 20.0 * 1e-6 * 1.01;
+        assert!(alarm(&machine, &program).is_none(), "{time_law:?}");
+        machine.axes[1].limits.velocity_max_lu_s = 20.0 * 1e-6 * 0.99;
+        let Some((1, alarm)) = alarm(&machine, &program) else { panic!("{time_law:?}: no alarm") };
+        assert_eq!(alarm.code, "P0002");
+        assert!(alarm.message.contains("line 2") && alarm.message.contains("velocity of axis Y"), "{alarm:?}");
+        let slow = Program::polyline(PathMode::ExactStop, 1e-7, &[[50.0, 0.0]]);
+        let Some((0, alarm)) = self::alarm(&spinner(), &slow) else { panic!("no alarm") };
+        assert!(!alarm.message.contains("axis"), "{alarm:?}");
+    }
+}

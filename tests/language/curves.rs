@@ -277,6 +277,108 @@ fn bspline_is_the_rational_b_spline() {
     refused("G1 X0 Y0 F1000\nBSPLINE\nX10 Y10\nX20 PW=0\nG1 X40\nX50\nM30", "E0513");
 }
 
+/// A place of the curve of a whole control polygon: x, y and weight of every control point, by de Boor's triangle of numbers.
+fn de_boor(polygon: &[[f64; 3]], p: usize, knots: &[f64], t: f64) -> [f64; 2] {
+    let k = (p..polygon.len()).rfind(|k| knots[*k] <= t && knots[*k] < knots[k + 1]).unwrap();
+    let mut d: Vec<[f64; 3]> = polygon[k - p..=k].iter().map(|[x, y, w]| [x * w, y * w, *w]).collect();
+    for level in 1..=p {
+        for j in (level..=p).rev() {
+            let i = k - p + j;
+            let share = (t - knots[i]) / (knots[i + p + 1 - level] - knots[i]);
+            d[j] = [0, 1, 2].map(|c| (1.0 - share) * d[j - 1][c] + share * d[j][c]);
+        }
+    }
+    [d[p][0] / d[p][2], d[p][1] / d[p][2]]
+}
+
+/// Drives a BSPLINE from (0, 0) along `blocks` (x, y, PW) and compares every block of it with the polygon, repeats included.
+fn drives_polygon(degree: usize, blocks: &[[f64; 3]]) -> Run {
+    let polygon: Vec<[f64; 3]> = [[0.0, 0.0, 1.0]].iter().chain(blocks).copied().collect();
+    let n = blocks.len();
+    let knots: Vec<f64> = (0..=n + degree + 1).map(|i| i.clamp(degree, n + 1) as f64 - degree as f64).collect();
+    let lines: String = blocks.iter().map(|[x, y, w]| format!("X{x} Y{y} PW={w}\n")).collect();
+    let result = ok(&format!("G1 X0 Y0 F1000\nBSPLINE SD={degree}\n{lines}M30"));
+    let found = splines(&result);
+    let numbers: Vec<u32> = found.iter().map(|next| next.block.line).collect();
+    assert_eq!(numbers, (3..3 + n as u32).collect::<Vec<_>>(), "a block of the path for every block: {blocks:?}");
+    let mut t = 0.0;
+    for next in &found {
+        for piece in pieces(next) {
+            for step in 0..=10 {
+                let u = piece.parameter_end_ratio * f64::from(step) / 10.0;
+                let wanted = de_boor(&polygon, degree, &knots, t + u);
+                let what = format!("SD={degree}, t {}, line {}, {blocks:?}", t + u, next.block.line);
+                near(value(piece, X, u), wanted[0], &what);
+                near(value(piece, Y, u), wanted[1], &what);
+            }
+            t += piece.parameter_end_ratio;
+        }
+        let wanted = de_boor(&polygon, degree, &knots, t);
+        near(next.end.0[X], wanted[0], "end of the block");
+        near(next.end.0[Y], wanted[1], "end of the block");
+    }
+    near(t, knots[n + 1], "the whole range");
+    result
+}
+
+#[test]
+fn a_control_point_counts_as_often_as_it_is_programmed() {
+    let point = |i: usize| [POINTS[i][0], POINTS[i][1], 1.0];
+    for degree in [2, 3] {
+        for repeated in 0..POINTS.len() {
+            for times in 1..=5 {
+                let blocks: Vec<[f64; 3]> =
+                    (0..POINTS.len()).flat_map(|i| vec![point(i); if i == repeated { times } else { 1 }]).collect();
+                drives_polygon(degree, &blocks);
+                // Weights of the same point differ: it pulls with all of them.
+                let weighted: Vec<[f64; 3]> =
+                    blocks.iter().zip([1.0, 2.0, 0.5].into_iter().cycle()).map(|([x, y, _], w)| [*x, *y, w]).collect();
+                drives_polygon(degree, &weighted);
+            }
+        }
+        // Every point twice; and nothing but one point.
+        let twice: Vec<[f64; 3]> = (0..POINTS.len()).flat_map(|i| [point(i); 2]).collect();
+        drives_polygon(degree, &twice);
+        drives_polygon(degree, &[point(0); 7]);
+    }
+}
+
+#[test]
+fn a_block_of_repeated_control_points_stands() {
+    let blocks: Vec<[f64; 3]> =
+        [0, 1, 1, 1, 1, 1, 2, 3].map(|i| [POINTS[i][0], POINTS[i][1], 1.0]).into_iter().collect();
+    let result = drives_polygon(3, &blocks);
+    // Three of five equal points draw the curve into the corner, the two that remain have no way.
+    let found = splines(&result);
+    let stands = |i: usize| (found[i].end.0 - found[i - 1].end.0).norm() < 1e-12;
+    assert_eq!((1..found.len()).map(stands).collect::<Vec<_>>(), [false, false, true, true, false, false, false]);
+    // With SD=2 two draw it there: the block of the first one ends in the corner, and that of a third one stands.
+    for times in [2, 3] {
+        let blocks: Vec<usize> = [0].into_iter().chain(vec![1; times]).chain([2, 3]).collect();
+        let blocks: Vec<[f64; 3]> = blocks.into_iter().map(|i| [POINTS[i][0], POINTS[i][1], 1.0]).collect();
+        let result = drives_polygon(2, &blocks);
+        let found = splines(&result);
+        for next in &found[1..times] {
+            near(next.end.0[X], POINTS[1][0], "the corner");
+            near(next.end.0[Y], POINTS[1][1], "the corner");
+        }
+        assert!((found[times].end.0 - found[times - 1].end.0).norm() > 1.0, "the last one leads away");
+    }
+    // A block that stands at the end leaves the direction in which the curve came: along the last leg of the polygon, here X.
+    let result = ok("G1 X0 Y0 F1000\nBSPLINE X10 Y10\nX20 Y0\nX30 Y0\nX30\nX30\nX30\nX30\nCT X40 Y10\nM30");
+    let circle = arc(&result.moves[result.moves.len() - 2]);
+    near(circle.centre_mm[0], 30.0, "centre");
+    near(circle.centre_mm[1], 10.0, "centre");
+    // The start that the first block names is the first control point, once; named again it counts twice.
+    let once = ok("G1 X0 Y0 F1000\nBSPLINE X0 Y0\nX10 Y10\nX20 Y0\nX30 Y10\nM30");
+    assert_eq!(splines(&once).len(), 3);
+    let slope = |result: &Run| plain(&pieces(splines(result)[0])[0], X, 0.0)[1];
+    near(slope(&once), 30.0, "three points from the start: a Bezier cubic");
+    let again = ok("G1 X0 Y0 F1000\nBSPLINE X0 Y0\nX0 Y0\nX10 Y10\nX20 Y0\nX30 Y10\nM30");
+    assert_eq!(splines(&again).iter().map(|next| next.block.line).collect::<Vec<_>>(), [3, 4, 5, 6]);
+    near(slope(&again), 0.0, "the first leg of the polygon has no length");
+}
+
 #[test]
 fn splines_end_where_another_motion_or_a_stop_begins() {
     let result = ok("G1 X0 Y0 F1000\nCSPLINE X10 Y10\nX20 M7\nM8\nX30 Y10\nG4 F1\nX40\nX50 Y0\nG1 X60\nM30");

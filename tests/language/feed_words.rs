@@ -159,6 +159,12 @@ fn acc_velolim_and_jerklim_change_the_limits_of_their_axis() {
         run.lasts(rest_to_rest_s(400.0, V, A, J));
     }
     assert!(alarm(&m, "VELOLIM[X]=101\nM30\n").contains("at most 100"));
+    for (text, named) in
+        [("JERKLIM[X]=0", "JERKLIM[X] of 0 %"), ("OVR=300", "OVR of 300 %"), ("ACC[Y]=-1", "ACC[Y] of -1 %")]
+    {
+        let said = alarm(&m, &format!("{text}\nM30\n"));
+        assert!(said.contains(named), "{said}");
+    }
     assert!(alarm(&m, "ACC[X]=0\nM30\n").contains("0 %"));
 }
 

@@ -72,6 +72,33 @@ fn smooth_splines_keep_all_limits_across_their_blocks() {
     }
 }
 
+/// Two equal control points of a BSPLINE SD=3 leave the curvature continuous; at three the curve has a corner, where G60 rests at the
+/// border of the blocks, and a block without a way; at the end it begins or stops with a speed of the parameter of 0.
+#[test]
+fn repeated_control_points_keep_all_limits() {
+    let leg = |times: usize| "X30 Y25 Z12\n".repeat(times);
+    for name in MACHINES {
+        let machine = machine(name, &[]);
+        for (mode, times) in [("G64", 2), ("G60", 2), ("G60", 3), ("G60", 5)] {
+            let end = "X60 Y30\n".repeat(times - 1) + "G9 X60 Y30\n";
+            let text = format!(
+                "G60 G0 X0 Y0 Z10\n{mode} G1 F9000\nBSPLINE X10 Y20\n{}X45 Y-5 Z15\nX52 Y20\n{end}G60 G1 X70\nM30\n",
+                leg(times)
+            );
+            let rows = setpoints(&machine, &text);
+            within_limits(&machine, &rows, &text);
+            let nearest = |point: [f64; 3]| {
+                let away = rows.iter().map(|(_, q)| (0..3).map(|i| (q[i] - point[i]).powi(2)).sum::<f64>().sqrt());
+                away.fold(f64::INFINITY, f64::min)
+            };
+            assert!(nearest([60.0, 30.0, 15.0]) < 1e-4, "{name} {mode}, {times} times: the last point");
+            // Rests lie between two set-points. A curve of degree 3 passes a point that counts three times, and misses one that counts twice.
+            let passes = nearest([30.0, 25.0, 12.0]) < 1e-4;
+            assert_eq!(passes, times >= 3, "{name} {mode}, {times} times: {}", nearest([30.0, 25.0, 12.0]));
+        }
+    }
+}
+
 #[test]
 fn polynomials_circles_in_space_and_akima_keep_all_limits() {
     let text = "\
@@ -93,5 +120,46 @@ M30
     for name in MACHINES {
         let machine = machine(name, &[]);
         within_limits(&machine, &setpoints(&machine, text), text);
+    }
+}
+
+/// Two equal points with SD=2 are a corner at the end of a block: G60 rests in it, and no axis steps.
+#[test]
+fn the_corner_of_a_quadratic_spline_is_the_end_of_a_block() {
+    let text = "G60 G0 X0 Y0\nG1 F9000\nBSPLINE SD=2 X10 Y20\nX30 Y25\nX30 Y25\nX45 Y-5\nX52 Y20\nG1 X70\nM30\n";
+    for name in MACHINES {
+        let machine = machine(name, &[]);
+        let t_s = machine.cycle.time_base.setpoint_period_s();
+        let rows = setpoints(&machine, text);
+        for (i, axis) in machine.axes.iter().enumerate() {
+            let accelerations = rows.windows(3).map(|q| (q[2].1[i] - 2.0 * q[1].1[i] + q[0].1[i]) / t_s.powi(2));
+            let most = accelerations.fold(0.0, |most: f64, a| most.max(a.abs()));
+            assert!(most <= axis.limits.acceleration_max_lu_s2 * (1.0 + 1e-6), "{name} {}: {most}", axis.name);
+        }
+        let ends = rows.iter().rfind(|(line, _)| *line == 4).unwrap();
+        assert!((ends.1[0] - 30.0).hypot(ends.1[1] - 25.0) < 1e-3, "{name}: {ends:?}");
+    }
+}
+
+/// The alarm names the axis that the program sends out of all numbers, or holds still, and no other.
+#[test]
+fn an_axis_that_cannot_is_named() {
+    let cases = [
+        ("POLY PO[X]=(2, 1EX300, -1EX300) PO[Y]=(1, 2, 3)", "P0001", "axis X"),
+        ("POLY PO[X]=(2, 1, 1) PO[Y]=(2, 1EX300, -1EX300)", "P0001", "axis Y"),
+        ("G1 X10 Y10 VELOLIM[Y]=0.000000001", "P0002", "velocity of axis Y"),
+    ];
+    for name in MACHINES {
+        for (block, code, named) in cases {
+            for law in ["continuous", "seven-phase"] {
+                let machine = machine(name, &[format!("feed.time_law={law}")]);
+                let text = format!("G1 F1000\n{block}\nM30\n");
+                let mut kernel = Kernel::new(Arc::new(machine), source(&text), false);
+                while kernel.cycle().unwrap() == Status::Running {}
+                let alarm = kernel.take_findings().alarm.expect(block);
+                assert_eq!((alarm.code, alarm.line()), (code, 2), "{name} {law}: {alarm:?}");
+                assert!(alarm.message.contains(named), "{name} {law}: {}", alarm.message);
+            }
+        }
     }
 }

@@ -195,8 +195,8 @@ fn short_blocks_get_smaller_fillets_and_it_is_said_once() {
     assert_eq!(begun, 6);
     assert_tangential(&pieces);
     let said: Vec<&str> = smoother.take_warnings().iter().map(|warning| warning.code).collect();
-    // The last block leads nowhere: its corner is left out, and that is said, too.
-    assert_eq!(said, ["S0005", "S0004"]);
+    // The last block leads nowhere: it ends in no corner, and nothing is said.
+    assert_eq!(said, ["S0005"]);
 }
 
 #[test]
@@ -208,6 +208,37 @@ fn a_block_that_is_all_fillet_leaves_its_count_to_the_next() {
     let [Curve::Arc(arc), Curve::Line(_)] = curves(&pieces)[..] else { panic!("{pieces:?}") };
     close(arc.radius_mm(), 1.0, 1e-9, "radius");
     close(arc.sweep_rad(), PI / 2.0, 1e-9, "angle");
+}
+
+/// RNDM holds on where the path ends, or rests before it goes straight on: there is no corner. The turn behind a rest is one.
+#[test]
+fn where_the_path_ends_there_is_no_corner() {
+    let said = |ways: &[&[f64]], between: &[MoveKind]| {
+        let mut moves = Vec::new();
+        for (i, way) in ways.iter().enumerate() {
+            let mut next = line(i as u64 + 1, way);
+            next.modes.path_mode = PathMode::G64;
+            let end = next.end;
+            moves.push(with_corner(next, fillet(1.0)));
+            for kind in between {
+                let mut idle = line(i as u64 + 1, way);
+                (idle.kind, idle.end) = (kind.clone(), end);
+                moves.push(idle);
+            }
+        }
+        let (_, mut smoother) = run(&machine(), &moves);
+        let lines = smoother.take_warnings().into_iter().map(|warning| (warning.code, warning.message));
+        lines.collect::<Vec<_>>()
+    };
+    let stop = MoveKind::Function { stops: true };
+    let functions: Vec<MoveKind> = (0..5).map(|_| MoveKind::Function { stops: false }).collect();
+    let (ahead, turn): ([&[f64]; 2], [&[f64]; 2]) = ([&[10.0, 0.0], &[20.0, 0.0]], [&[10.0, 0.0], &[10.0, 10.0]]);
+    assert_eq!(said(&turn, &[]), []);
+    assert_eq!(said(&turn[..1], std::slice::from_ref(&stop)), []);
+    assert_eq!(said(&turn[..1], &functions), []);
+    assert_eq!(said(&ahead, std::slice::from_ref(&stop)), []);
+    let turned = said(&turn, &[stop]);
+    assert!(turned.len() == 1 && turned[0].0 == "S0004" && turned[0].1.contains("line 1 "), "{turned:?}");
 }
 
 #[test]

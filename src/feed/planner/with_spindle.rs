@@ -74,7 +74,7 @@ impl Planner {
                 format!("the thread of line {}: {blocked}", contour.block.line),
             )));
         }
-        super::check_time(length_lu / (thread.rise_mm * thread.speed_rad_s), path)?;
+        super::check_time(length_lu / (thread.rise_mm * thread.speed_rad_s), path, || None)?;
         self.last_thread = (thread.is_cut() && !contour.stop_at_end).then_some(Before { thread, length_lu, ends });
         Ok(piece)
     }

@@ -6,9 +6,10 @@
 //!
 //! n blocks of degree p make n - p + 1 spans of the knots, so that a block is no span. Block i drives from the Greville abscissa
 //! `xi_i-1` to `xi_i`, `xi_i = (t_i+1 + ... + t_i+p) / p`: the place where control point i pulls most. For SD=3 these are the knots, but
-//! for the first and the last two blocks, which share a span; for SD=2 the middles of the spans. The length of span j (from 0) is the
-//! PL of block j + 2, so that the PL of the first block, and with SD=3 that of the last one, has no effect. How the control shares a span
-//! between the blocks is not known; the curve does not depend on it.
+//! for the first and the last two blocks, which share a span; for SD=2 the middles of the spans. Of two equal points with SD=2 the
+//! first one's block ends in the knot between the two: the curve has a corner there, and that is no place inside of a block. The length
+//! of span j (from 0) is the PL of block j + 2, so that the PL of the first block, and with SD=3 that of the last one, has no effect.
+//! How the control shares a span between the blocks is not known; the curve does not depend on it.
 //!
 //! With fewer blocks than the degree, the degree is their number. Does not look at words.
 
@@ -100,6 +101,12 @@ impl BSpline {
         if index >= reference { way(reference, index) } else { -way(index, reference) }
     }
 
+    /// The next control point is the same, and neither is one of the ends: with SD=2 the corner of the curve lies between them.
+    fn is_doubled(&self, number: usize, end: Option<usize>) -> bool {
+        let inside = number > 0 && end.is_none_or(|end| number + 1 < end);
+        inside && self.point(number).position == self.point(number + 1).position
+    }
+
     fn make(&mut self, end: Option<usize>) -> Result<Arc<PolynomialGeometry>, NoWeight> {
         let p = self.degree.min(end.unwrap_or(usize::MAX));
         let block = self.next;
@@ -107,8 +114,13 @@ impl BSpline {
         let base = (block + 1).max(p);
         let base = end.map_or(base, |end| base.min(end));
         let knot = |index: usize| self.knot(p, index, base, end);
-        let greville = |i: usize| (i + 1..=i + p).map(knot).sum::<f64>() / p as f64;
-        let (from, to) = (greville(block - 1), greville(block));
+        let border = |i: usize| {
+            if p == 2 && self.is_doubled(i, end) {
+                return knot(i + 2);
+            }
+            (i + 1..=i + p).map(knot).sum::<f64>() / p as f64
+        };
+        let (from, to) = (border(block - 1), border(block));
         let mut pieces = Vec::new();
         // Spans that the block touches: t_k to t_k+1.
         for k in block.max(p)..=(block + p) {
