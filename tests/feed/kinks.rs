@@ -58,6 +58,9 @@ fn keeps(machine: &Machine, program: &Program, case: &str) -> f64 {
     time_s
 }
 
+/// Appends moves.
+type Shape<'a> = &'a dyn Fn(&mut Program);
+
 /// A straight line on which A turns back, starts and goes in steps: the linear axes have no corner, and 1 rad beside 1 mm is none.
 #[test]
 fn a_rotary_axis_that_goes_along_keeps_its_limits() {
@@ -79,7 +82,7 @@ fn a_rotary_axis_that_goes_along_keeps_its_limits() {
             program.line(&[10.0 * f64::from(i), 0.0, 0.0, 2.0 * one_deg * (0.5 * f64::from(i)).sin()]);
         }
     };
-    let shapes: [(&str, &dyn Fn(&mut Program)); 3] = [("back", &back), ("starts", &starts), ("waves", &waves)];
+    let shapes: [(&str, Shape<'_>); 3] = [("back", &back), ("starts", &starts), ("waves", &waves)];
     for law in LAWS {
         let machine = under(with_rotary(), law);
         for mode in ROUNDING {

@@ -340,7 +340,8 @@ impl Continuous {
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
         layout.entry = entry;
         layout.extend(&pieces[..count], known, stretches, start == Start::Rest);
-        if !pieces[..count].last().is_some_and(|last| last.rests_after) {
+        // Where the front is cut again its intervals were made for the state that it begins with.
+        if known > 0 && !pieces[..count].last().is_some_and(|last| last.rests_after) {
             layout.grade_stop(known, pieces);
         }
         if self.regime.from_lu > 0.0 && known == 0 {
