@@ -277,7 +277,7 @@ impl Rules {
         let pair = Pair { before: joint.before.curve, after: joint.after.curve, linear: &self.linear };
         let blend = common(&pair, room.clamped(f64::INFINITY), tolerances, |t| joint.cuts(t))?;
         // Curves may turn back further on even where they do not in the corner.
-        if blend.slowest_ratio < REVERSAL_COS_MIN {
+        if pair.slowest_ratio(blend.length_lu) < REVERSAL_COS_MIN {
             return Some(Junction::Stop);
         }
         let [u, v] = joint.ends;

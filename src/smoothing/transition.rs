@@ -66,8 +66,6 @@ pub(super) struct Transition {
     pub length_lu: f64,
     /// Distance of its middle from the point where the curves meet, linear axes.
     pub deviation_mm: f64,
-    /// Least way over change of the parameter, of the axes whose way is that of the path: 1 at the ends, 0 in a cusp, cos(theta/2) between two lines.
-    pub slowest_ratio: f64,
 }
 
 /// Two curves that meet.
@@ -91,9 +89,11 @@ impl Tolerances {
 }
 
 impl Pair<'_> {
-    /// The axes whose way is that of the path.
-    fn counted(&self) -> PerAxis<bool> {
-        if self.before.rotary_only() { self.linear.map(|linear| !linear) } else { *self.linear }
+    /// Least way over change of the parameter along the blend over T, of the axes whose way is that of the path: 1 at the ends, 0 in a cusp, cos(theta/2)
+    /// between two lines.
+    pub(super) fn slowest_ratio(&self, t_lu: f64) -> f64 {
+        let counted = if self.before.rotary_only() { self.linear.map(|linear| !linear) } else { *self.linear };
+        slowest_ratio(&self.polynomial(t_lu), 2.0 * t_lu, &counted)
     }
 
     /// Programmed position at s from the meeting point, negative before it.
@@ -164,8 +164,7 @@ pub(super) fn common(
     let middle = value(&numerator_lu, t_lu) - pair.programmed(0.0);
     let piece = piece(2.0 * t_lu, numerator_lu);
     let curve = chained(vec![piece], ends(t_lu), pair.linear)?;
-    let slowest_ratio = slowest_ratio(&numerator_lu, 2.0 * t_lu, &pair.counted());
-    Some(Transition { curve, length_lu: t_lu, deviation_mm: middle.masked(pair.linear).norm(), slowest_ratio })
+    Some(Transition { curve, length_lu: t_lu, deviation_mm: middle.masked(pair.linear).norm() })
 }
 
 fn largest(pair: &Pair<'_>, t_max_lu: f64, tolerances: &Tolerances) -> Option<f64> {
@@ -241,9 +240,7 @@ pub(super) fn per_axis(
     let pieces: Vec<PolynomialPiece> = pieces.collect();
     let deviation = PerAxis::from_fn(|axis| MIDDLE_RATIO * reach[axis] * turn[axis]);
     let curve = chained(pieces, ends(t_lu), linear)?;
-    // Where the middle is every axis goes half way between its two directions.
-    let slowest_ratio = ((u + v) * 0.5).masked(linear).norm();
-    Some(Transition { curve, length_lu: t_lu, deviation_mm: deviation.masked(linear).norm(), slowest_ratio })
+    Some(Transition { curve, length_lu: t_lu, deviation_mm: deviation.masked(linear).norm() })
 }
 
 /// Every T_j that is longer than another one by no more than `near_lu` as long as that one: no axis deviates by more than before.

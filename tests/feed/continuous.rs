@@ -3,7 +3,9 @@
 use crate::support::{Program, Random, modes, plan, spinner, total_s};
 use sollwert::base::AxisId;
 use sollwert::feed::{Limit, LimitKind, Phase, PlannedPiece};
+use sollwert::kinematics::JointPath;
 use sollwert::machine::{AccelerationMode, AccelerationReduction, Machine, PathMode, TimeLawKind};
+use sollwert::smoothing::PieceKind;
 
 fn machine() -> Machine {
     let mut machine = spinner();
@@ -197,15 +199,19 @@ fn a_path_that_is_handed_over_block_by_block_is_planned_to_its_end() {
     assert!(planned.iter().all(|piece| piece.path.length_lu() == 0.0 || piece.law.duration_s() > 0.0));
 }
 
-/// An arc into a line that all but turns back (178.3°): the blend between them has a place with a radius of picometres. The path has to crawl there, but no axis
+/// An arc into a line that all but turns back (178.3°): the blend between them has a place with next to no radius. The path has to crawl there, but no axis
 /// has to rest, as each has to with exact stops; and it must not creep along all of the blend at the speed that this place allows.
 #[test]
 fn a_blend_that_all_but_turns_back_is_not_crept_along() {
     let mut program = Program::new(PathMode::G642, 1430.0);
     program.line(&[-0.9823, 2.7093]);
     program.arc([-1.13745, 2.653044], 4.31353, 0.0);
-    program.line(&[-1.199154, 2.492531]);
+    // Two micrometres beside the cusp, where the path would stop.
+    program.line(&[-1.199154, 2.494531]);
     let machine = machine();
+    let behind_arc =
+        |path: &JointPath| matches!(path.contour.kind, PieceKind::Blend(..)) && path.contour.block.number == 2;
+    assert!(program.paths(&machine).iter().any(behind_arc), "no blend behind the arc");
     let time_s = total_s(&program.planned(&machine));
     // From rest to rest over the line, the arc and the line, with stops between them.
     let mut stops = program.clone();
