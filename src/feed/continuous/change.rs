@@ -10,7 +10,7 @@ use super::along::Along;
 use super::chain::{Chain, PathPoint, Profile, Start};
 use super::grid::{Grid, Settling, Stretch};
 use super::interval::{Interval, Tangent};
-use super::layout::Layout;
+use super::layout::{self, Layout};
 use super::regime::rapids;
 use super::{Continuous, Piece, Sight, look};
 use crate::feed::PathState;
@@ -135,7 +135,7 @@ impl Continuous {
             return Change::Planned;
         }
         self.regime.override_ratio = before;
-        self.kept = self.chain.intervals.len();
+        self.kept = layout::handed_out(&self.places);
         Change::NotYet
     }
 

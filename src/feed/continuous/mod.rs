@@ -249,7 +249,7 @@ impl Continuous {
             Ok(true) => {}
             Ok(false) => {
                 // What was planned before still stands, to its end.
-                self.kept = self.chain.intervals.len();
+                self.kept = layout::handed_out(&self.places);
                 if self.places.is_empty() {
                     self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
                 }
