@@ -34,6 +34,12 @@ const NEAR_BORDER_SHARE: f64 = 2e-3;
 const FLOOR_RATIO: f64 = 0.997;
 const FLOOR_WAYS: f64 = 1.5;
 
+/// A stop from the new feed may take so many times the way that it takes on a line.
+const STOP_WAYS: f64 = 2.0;
+
+/// What curves take of acceleration and jerk makes the way to the new feed longer than on a line, so many times where no plan is found.
+const WIDER_RATIOS: [f64; 3] = [1.0, 2.0, 4.0];
+
 /// By how much the speeds of the plan before may be exceeded on the way.
 const LOOSE_RATIO: f64 = 1.002;
 
@@ -58,6 +64,8 @@ pub(in crate::feed) enum Change {
 #[derive(Clone, Copy, Debug, Default)]
 struct Expected {
     way_lu: f64,
+    /// The way from the new feed to a stop.
+    stop_lu: f64,
     /// So far before the plan before comes down to the new feed a plan with that may have to leave it.
     landing_lu: f64,
 }
@@ -173,17 +181,30 @@ impl Continuous {
     /// Another feed above 0.
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
         let before = self.regime.move_to(override_ratio);
-        let Expected { way_lu: guess_lu, landing_lu } = self.expect(pieces, start, false);
+        let found = WIDER_RATIOS.iter().find_map(|wider_ratio| self.settled(pieces, start, *wider_ratio));
+        let Some((Trial { layout, profile, way_lu }, count)) = found else {
+            [self.regime.moving_ratio, self.regime.fastest_ratio] = before;
+            return false;
+        };
+        let pieces = &pieces[..count];
+        self.regime.settling_lu = way_lu;
+        let (layout, profile) = self.refined(layout, profile, pieces, start);
+        self.adopt(layout, profile, pieces.last().is_some_and(|last| last.rests_after));
+        true
+    }
+
+    /// A plan that comes to the feed in force over about so many times the way that it takes on a line, and how many pieces it reaches.
+    fn settled(&mut self, pieces: &mut [Piece<'_>], start: Start, wider_ratio: f64) -> Option<(Trial, usize)> {
+        let expected = self.expect(pieces, start, false, wider_ratio);
         let count = self.usual_reach(pieces, start);
         let layout = self.layout(pieces, count, 0, start);
         let pieces = &pieces[..count];
-        let rests = pieces.last().is_some_and(|last| last.rests_after);
         let most_lu = self.above_lu(&layout.chain);
+        let floors_end_lu = self.floors_end_lu(&layout.chain, most_lu, &expected);
         let mut attempt = |way_lu: f64, longer: Option<&Trial>| {
             let mut layout = layout.clone();
             if way_lu > 0.0 {
-                let floor_lu = (FLOOR_WAYS * way_lu).min(most_lu - landing_lu);
-                layout.chain.floors_lu2_s2 = self.floors(&layout.chain, floor_lu);
+                layout.chain.floors_lu2_s2 = self.floors(&layout.chain, (FLOOR_WAYS * way_lu).min(floors_end_lu));
                 self.settle(&mut layout, pieces, way_lu);
             }
             let mut trial = self.trial(layout, pieces, start, way_lu, longer)?;
@@ -195,15 +216,8 @@ impl Continuous {
             }
             None
         };
-        let found = attempt(0.0, None).or_else(|| shortest(guess_lu, most_lu, attempt));
-        let Some(Trial { layout, profile, way_lu }) = found else {
-            [self.regime.moving_ratio, self.regime.fastest_ratio] = before;
-            return false;
-        };
-        self.regime.settling_lu = way_lu;
-        let (layout, profile) = self.refined(layout, profile, pieces, start);
-        self.adopt(layout, profile, rests);
-        true
+        let found = attempt(0.0, None).or_else(|| shortest(expected.way_lu, most_lu, attempt));
+        found.map(|trial| (trial, count))
     }
 
     /// 0 %, while the path moves.
@@ -219,7 +233,7 @@ impl Continuous {
             }
             pieces[rapids - 1].rests_after = rested;
         }
-        let (guess_lu, most_lu) = (self.expect(pieces, start, true).way_lu, self.way_left_lu());
+        let (guess_lu, most_lu) = (self.expect(pieces, start, true, 1.0).way_lu, self.way_left_lu());
         let count = self.usual_reach(pieces, start);
         let pieces = &mut pieces[..count];
         let found = shortest(guess_lu, most_lu, |way_lu, longer| {
@@ -289,7 +303,7 @@ impl Continuous {
     }
 
     /// Prepares the grids for a change from where the front stands.
-    fn expect(&mut self, pieces: &mut [Piece<'_>], start: Start, stops: bool) -> Expected {
+    fn expect(&mut self, pieces: &mut [Piece<'_>], start: Start, stops: bool, wider_ratio: f64) -> Expected {
         let (Some(front), Start::At(point)) = (pieces.first_mut(), start) else { return Expected::default() };
         self.regime.look(front);
         front.flow.grid = None;
@@ -303,9 +317,10 @@ impl Continuous {
         // The speed that the acceleration leads to before it can be taken away.
         let led_lu_s = (v + 0.5 * a * phase_s).max(0.0);
         let way_lu = dynamics.ramp_length_lu(led_lu_s, target_lu_s) + a.signum() * v * phase_s;
-        let way_lu = way_lu.max(WAY_SHARE * v * full_s);
+        let way_lu = wider_ratio * way_lu.max(WAY_SHARE * v * full_s);
         self.regime.transition = Some(Settling { way_lu, speed_lu_s: v });
-        Expected { way_lu: FIRST_RATIO * way_lu, landing_lu: 2.0 * target_lu_s * full_s }
+        let stop_lu = dynamics.ramp_length_lu(target_lu_s, 0.0);
+        Expected { way_lu: FIRST_RATIO * way_lu, stop_lu, landing_lu: 2.0 * target_lu_s * full_s }
     }
 
     /// Way of the plan before from where the front stands.
@@ -328,6 +343,21 @@ impl Continuous {
             at_lu += interval.length_lu();
         }
         if above { at_lu } else { 0.0 }
+    }
+
+    /// Up to where the speed must not fall below the new feed and the plan before: where that slows down for a place of the path, a plan with the new feed
+    /// leaves it sooner; where it does so for the end of its window, this one has an end of its own.
+    fn floors_end_lu(&self, chain: &Chain, most_lu: f64, expected: &Expected) -> f64 {
+        let length_lu = |intervals: &[Interval]| intervals.iter().map(Interval::length_lu).sum::<f64>();
+        let before = &self.chain.intervals;
+        let braking = self.braking.clamp(self.first, before.len());
+        let braking_lu = length_lu(&before[self.first..braking]) - self.offset_lu();
+        let landed_lu = most_lu - expected.landing_lu;
+        if most_lu < braking_lu {
+            landed_lu
+        } else {
+            landed_lu.max(length_lu(&chain.intervals) - STOP_WAYS * expected.stop_lu)
+        }
     }
 
     /// b at the borders of a chain up to a way that must not be fallen below: what the new feed and the plan before have in common.

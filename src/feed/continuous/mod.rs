@@ -3,7 +3,8 @@
 //! In: the pieces in the look-ahead window ([`Flow`]), front first. Out: the [`TimeLaw`] of the front piece. From the state that the front begins with the
 //! fastest profile is planned that ends at rest inside the window (`chain`); as much of it is kept as the stop at its end does not touch,
 //! and handed out piece by piece, so that a plan serves many pieces when the window is long. A plan that cannot be made, or does not keep every
-//! limit, is not taken: the path goes on as planned before, to the stop at its end, which is why there is always a way to stop.
+//! limit, is not taken: the path goes on as planned before, to the stop at its end unless the next piece finds a plan, which is why there is always a
+//! way to stop.
 //! A change of the feed override while the front piece moves is a new plan from where it is (`change`).
 //! Does not know what a block is.
 
@@ -11,7 +12,6 @@ mod along;
 mod chain;
 mod change;
 mod estimate;
-mod further;
 mod grid;
 mod group;
 mod held;
@@ -248,7 +248,7 @@ impl Continuous {
         match self.lay(pieces, sight) {
             Ok(true) => {}
             Ok(false) => {
-                // What was planned before still stands, to its end.
+                // What was planned before still stands, to its end; the next piece, with more of the window in sight, tries again.
                 self.kept = layout::handed_out(&self.places);
                 if self.places.is_empty() {
                     self.refuge = pieces.first().and_then(|piece| piece.flow.grid.as_ref()).map(refuge::alone);
@@ -261,22 +261,12 @@ impl Continuous {
 
     /// A new plan, if there is one.
     fn lay(&mut self, pieces: &mut [Piece<'_>], sight: Sight) -> Result<bool, TooShort> {
-        // From inside the front everything is cut again.
-        let (changes, all) = (self.regime.point.is_some(), self.places.len());
-        if sight != Sight::All && pieces.len() <= all {
+        if sight != Sight::All && pieces.len() <= self.places.len() {
             return Err(TooShort);
         }
-        let known = if changes { 0 } else { self.known() };
-        if self.lay_after(pieces, sight, known)? {
-            return Ok(true);
-        }
-        // What is left of the plan before is a way that keeps every limit, but not on every other grid: so on its own.
-        Ok(!changes && known < all && all < pieces.len() && self.lay_after(pieces, sight, all)?)
-    }
-
-    /// A new plan in which the first `known` pieces are cut as before.
-    fn lay_after(&mut self, pieces: &mut [Piece<'_>], sight: Sight, known: usize) -> Result<bool, TooShort> {
         let start = self.start();
+        // Pieces that are cut as before; from inside the front everything is cut again.
+        let known = if self.regime.point.is_some() { 0 } else { self.known() };
         let known = known.min(pieces.len().saturating_sub(1));
         let Reach { usual, whole } = self.reach(pieces, sight, known, start)?;
         self.usual_only &= start != Start::Rest;
@@ -382,12 +372,7 @@ impl Continuous {
         let look = look(pieces, owners);
         self.planning.is_last = pieces.last().is_some_and(|last| last.rests_after);
         self.planning.handed_out = handed_out;
-        let planned = self.planning.plan(chain, start, &points[..fast], &look);
-        if planned.is_some() || points.len() <= fast {
-            return planned;
-        }
-        let further = self.stop_further_on(chain);
-        self.planning.plan(chain, start, &further, &look).or_else(|| self.planning.plan(chain, start, &points, &look))
+        self.planning.plan(chain, start, &points[..fast], &look)
     }
 
     /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
