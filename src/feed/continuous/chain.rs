@@ -112,6 +112,8 @@ pub(super) struct Planning {
     solver: Solver,
     /// Whether there is a profile is to be found out quickly: what is found only with effort counts as none.
     pub hurries: bool,
+    /// Where the tangents of an estimate leave no way others are looked for, which takes longer.
+    pub insists: bool,
     /// The path rests at the end of the chain: no later plan will do it better.
     pub is_last: bool,
     /// So many intervals will be handed out before the next plan, whatever this one is.
@@ -188,7 +190,7 @@ impl Planning {
         let (mut before, mut detours) = (None, 0);
         for round in 0.. {
             self.solved = self.solve(chain, start, &range);
-            if !self.solved && self.hurries && detours < DETOURS_MAX && self.solve_wider(chain, start, &range) {
+            if !self.solved && self.insists && detours < DETOURS_MAX && self.solve_wider(chain, start, &range) {
                 let profile = self.profile(chain, start);
                 self.take_estimate(&profile, &range);
                 detours += 1;

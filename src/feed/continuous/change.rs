@@ -181,7 +181,15 @@ impl Continuous {
     /// Another feed above 0.
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
         let before = self.regime.move_to(override_ratio);
-        let found = WIDER_RATIOS.iter().find_map(|wider_ratio| self.settled(pieces, start, *wider_ratio));
+        let mut found: Option<(Trial, usize)> = None;
+        for wider_ratio in WIDER_RATIOS {
+            found = self.settled(pieces, start, wider_ratio).or(found);
+            // One that settles only with the stop at its end has not looked far enough.
+            let lands = |(trial, count): &(Trial, usize)| pieces[count - 1].rests_after || !trial.settles_to_its_end();
+            if found.as_ref().is_some_and(lands) {
+                break;
+            }
+        }
         let Some((Trial { layout, profile, way_lu }, count)) = found else {
             [self.regime.moving_ratio, self.regime.fastest_ratio] = before;
             return false;
@@ -260,12 +268,12 @@ impl Continuous {
             Some(longer) => vec![longer.shortened(&layout.chain, way_lu)],
         };
         // Of a plan to a stop all is gone along; of one to another feed the tangents fit further than they need to.
-        (self.planning.hurries, self.planning.is_last) = (true, true);
+        (self.planning.hurries, self.planning.is_last, self.planning.insists) = (true, true, true);
         let profile = {
             let look = look(pieces, &layout.owners);
             hints.iter().find_map(|hints| self.planning.plan(&mut layout.chain, start, hints, &look))
         };
-        self.planning.hurries = false;
+        (self.planning.hurries, self.planning.insists) = (false, false);
         Some(Trial { profile: profile?, layout, way_lu })
     }
 
@@ -401,8 +409,9 @@ impl Continuous {
             // The control point of the parabola through the three as well.
             let b = from.max(to).max(2.0 * middle - 0.5 * (from + to));
             // Room for the solver, but not above any feed that has been in force.
-            let v = b.sqrt();
-            interval.cap.velocity_lu_s = interval.cap.velocity_lu_s.max((LOOSE_RATIO * v).min(highest_lu_s.max(v)));
+            let [v, reached_lu_s] = [b, from.max(middle).max(to)].map(f64::sqrt);
+            let allowed_lu_s = (LOOSE_RATIO * v).min(highest_lu_s.max(reached_lu_s));
+            interval.cap.velocity_lu_s = interval.cap.velocity_lu_s.max(allowed_lu_s);
             (at_lu, index) = (end_lu, index + 1);
         }
     }
@@ -414,13 +423,15 @@ impl Continuous {
         pieces: &[Piece<'_>],
         start: Start,
     ) -> Option<Profile> {
-        for _ in 0..SLOWER_ATTEMPTS_MAX {
+        self.planning.insists = true;
+        let mut attempts = (0..SLOWER_ATTEMPTS_MAX).map_while(|_| {
             let profile = self.attempt(layout, pieces, start)?;
-            if keeps_velocities(layout, &profile, pieces, self.regime.settling_lu) {
-                return Some(profile);
-            }
-        }
-        None
+            let keeps = keeps_velocities(layout, &profile, pieces, self.regime.settling_lu);
+            Some((profile, keeps))
+        });
+        let found = attempts.find(|(_, keeps)| *keeps);
+        self.planning.insists = false;
+        found.map(|(profile, _)| profile)
     }
 }
 
@@ -456,6 +467,12 @@ fn keeps_velocities(layout: &mut Layout, profile: &Profile, pieces: &[Piece<'_>]
 }
 
 impl Trial {
+    /// The new feed holds nowhere in it.
+    fn settles_to_its_end(&self) -> bool {
+        let length_lu: f64 = self.layout.chain.intervals.iter().map(Interval::length_lu).sum();
+        self.way_lu >= (1.0 - WAY_SHARE) * length_lu
+    }
+
     /// What it says about a chain with a shorter way: the same speeds sooner.
     fn shortened(&self, chain: &Chain, way_lu: f64) -> Vec<PathPoint> {
         let mut own = Along::new(&self.layout.chain, &self.profile, 0, 0.0);
