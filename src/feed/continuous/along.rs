@@ -4,6 +4,7 @@
 
 use super::chain::{Chain, Profile};
 use super::estimate::ray_exponent;
+use super::interval::Interval;
 use crate::base::Portable;
 
 /// A walk along a plan.
@@ -13,16 +14,25 @@ pub(super) struct Along<'a> {
     index: usize,
     /// Way to the start of interval `index`.
     begin_lu: f64,
+    /// Beyond it the speed stays as it is there.
+    held_from_lu: f64,
 }
 
 impl<'a> Along<'a> {
     /// From a place `offset_lu` after the start of interval `first`.
     pub fn new(chain: &'a Chain, profile: &'a Profile, first: usize, offset_lu: f64) -> Self {
-        Self { chain, profile, index: first, begin_lu: -offset_lu }
+        Self { chain, profile, index: first, begin_lu: -offset_lu, held_from_lu: f64::INFINITY }
+    }
+
+    /// The same without what comes after the start of an interval: as fast as there, from the beginning if that lies before it.
+    pub fn held_from(self, index: usize) -> Self {
+        let lengths_lu = self.chain.intervals.get(self.index..index).unwrap_or(&[]).iter().map(Interval::length_lu);
+        Self { held_from_lu: (self.begin_lu + lengths_lu.sum::<f64>()).max(0.0), ..self }
     }
 
     /// b at a way; `None` beyond the end, and at rest.
     pub fn at(&mut self, way_lu: f64) -> Option<f64> {
+        let way_lu = way_lu.min(self.held_from_lu);
         loop {
             let end_lu = self.begin_lu + self.chain.intervals.get(self.index)?.length_lu();
             if way_lu <= end_lu || self.index + 1 == self.chain.intervals.len() {

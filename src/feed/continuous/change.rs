@@ -337,9 +337,15 @@ impl Continuous {
         left.iter().map(Interval::length_lu).sum::<f64>() - self.offset_lu()
     }
 
+    /// The speeds of the plan before from where the front stands on. Where it brakes for the end of its window it does not say how fast the path may be: one that
+    /// has to brake less would have to be slower than the hardest braking there is.
+    fn before(&self) -> Along<'_> {
+        Along::new(&self.chain, &self.profile, self.first, self.offset_lu()).held_from(self.braking)
+    }
+
     /// Way from where the front stands to where the plan before comes down to the caps of a new chain.
     fn above_lu(&self, chain: &Chain) -> f64 {
-        let mut before = Along::new(&self.chain, &self.profile, self.first, self.offset_lu());
+        let mut before = self.before();
         let (mut at_lu, mut above) = (0.0, false);
         for interval in &chain.intervals {
             let Some(b) = before.at(at_lu) else { break };
@@ -354,23 +360,16 @@ impl Continuous {
     }
 
     /// Up to where the speed must not fall below the new feed and the plan before: where that slows down for a place of the path, a plan with the new feed
-    /// leaves it sooner; where it does so for the end of its window, this one has an end of its own.
+    /// leaves it sooner; else up to its own stop.
     fn floors_end_lu(&self, chain: &Chain, most_lu: f64, expected: &Expected) -> f64 {
-        let length_lu = |intervals: &[Interval]| intervals.iter().map(Interval::length_lu).sum::<f64>();
-        let before = &self.chain.intervals;
-        let braking = self.braking.clamp(self.first, before.len());
-        let braking_lu = length_lu(&before[self.first..braking]) - self.offset_lu();
-        let landed_lu = most_lu - expected.landing_lu;
-        if most_lu < braking_lu {
-            landed_lu
-        } else {
-            landed_lu.max(length_lu(&chain.intervals) - STOP_WAYS * expected.stop_lu)
-        }
+        let length_lu: f64 = chain.intervals.iter().map(Interval::length_lu).sum();
+        let landed = most_lu < (1.0 - WAY_SHARE) * length_lu;
+        if landed { most_lu - expected.landing_lu } else { length_lu - STOP_WAYS * expected.stop_lu }
     }
 
     /// b at the borders of a chain up to a way that must not be fallen below: what the new feed and the plan before have in common.
     fn floors(&self, chain: &Chain, way_lu: f64) -> Vec<f64> {
-        let mut before = Along::new(&self.chain, &self.profile, self.first, self.offset_lu());
+        let mut before = self.before();
         let (mut at_lu, mut cap_lu_s) = (0.0, f64::INFINITY);
         let floor = |interval: &Interval| {
             if at_lu > way_lu {
@@ -387,7 +386,7 @@ impl Continuous {
 
     /// Over a way from where the front stands the caps give way to the speeds of the plan before; a border is made where it ends.
     pub(super) fn settle(&self, layout: &mut Layout, pieces: &[Piece<'_>], way_lu: f64) {
-        let mut before = Along::new(&self.chain, &self.profile, self.first, self.offset_lu());
+        let mut before = self.before();
         let mut at_lu = 0.0;
         let mut index = 0;
         while index + 1 < layout.chain.intervals.len() {
