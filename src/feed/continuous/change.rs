@@ -77,6 +77,17 @@ struct Trial {
     way_lu: f64,
 }
 
+/// A plan to another feed.
+struct Settled {
+    trial: Trial,
+    /// How many pieces it reaches.
+    count: usize,
+    /// It settles before its end; one that only does with its stop has not looked far enough.
+    lands: bool,
+    /// On its way it nowhere falls below the feed that it comes to.
+    floors_hold: bool,
+}
+
 impl Continuous {
     /// In force since the last change that was planned.
     pub fn override_ratio(&self) -> f64 {
@@ -181,16 +192,19 @@ impl Continuous {
     /// Another feed above 0.
     fn slow_or_fast(&mut self, pieces: &mut [Piece<'_>], start: Start, override_ratio: f64) -> bool {
         let before = self.regime.move_to(override_ratio);
-        let mut found: Option<(Trial, usize)> = None;
+        let mut found: Option<Settled> = None;
+        let mut seen = 0;
         for wider_ratio in WIDER_RATIOS {
-            found = self.settled(pieces, start, wider_ratio).or(found);
-            // One that settles only with the stop at its end has not looked far enough.
-            let lands = |(trial, count): &(Trial, usize)| pieces[count - 1].rests_after || !trial.settles_to_its_end();
-            if found.as_ref().is_some_and(lands) {
+            let expected = self.expect(pieces, start, false, wider_ratio);
+            let count = self.usual_reach(pieces, start);
+            // The window has no more, or what there is was enough.
+            if count <= seen || found.as_ref().is_some_and(|found| found.lands) {
                 break;
             }
+            seen = count;
+            found = self.settled(&mut pieces[..count], start, &expected).or(found);
         }
-        let Some((Trial { layout, profile, way_lu }, count)) = found else {
+        let Some(Settled { trial: Trial { layout, profile, way_lu }, count, floors_hold, .. }) = found else {
             [self.regime.moving_ratio, self.regime.fastest_ratio] = before;
             return false;
         };
@@ -198,17 +212,20 @@ impl Continuous {
         self.regime.settling_lu = way_lu;
         let (layout, profile) = self.refined(layout, profile, pieces, start);
         self.adopt(layout, profile, pieces.last().is_some_and(|last| last.rests_after));
+        if !floors_hold {
+            // With the next block it will have to slow down less.
+            self.kept = layout::handed_out(&self.places);
+        }
         true
     }
 
-    /// A plan that comes to the feed in force over about so many times the way that it takes on a line, and how many pieces it reaches.
-    fn settled(&mut self, pieces: &mut [Piece<'_>], start: Start, wider_ratio: f64) -> Option<(Trial, usize)> {
-        let expected = self.expect(pieces, start, false, wider_ratio);
-        let count = self.usual_reach(pieces, start);
+    /// A plan of all pieces that comes to the feed in force as soon as it can.
+    fn settled(&mut self, pieces: &mut [Piece<'_>], start: Start, expected: &Expected) -> Option<Settled> {
+        let count = pieces.len();
         let layout = self.layout(pieces, count, 0, start);
-        let pieces = &pieces[..count];
         let most_lu = self.above_lu(&layout.chain);
-        let floors_end_lu = self.floors_end_lu(&layout.chain, most_lu, &expected);
+        let length_lu: f64 = layout.chain.intervals.iter().map(Interval::length_lu).sum();
+        let floors_end_lu = floors_end_lu(length_lu, most_lu, expected);
         let mut attempt = |way_lu: f64, longer: Option<&Trial>| {
             let mut layout = layout.clone();
             if way_lu > 0.0 {
@@ -224,8 +241,10 @@ impl Continuous {
             }
             None
         };
-        let found = attempt(0.0, None).or_else(|| shortest(expected.way_lu, most_lu, attempt));
-        found.map(|trial| (trial, count))
+        let trial = attempt(0.0, None).or_else(|| shortest(expected.way_lu, most_lu, attempt))?;
+        let rests = pieces[count - 1].rests_after;
+        let lands = rests || trial.way_lu < (1.0 - WAY_SHARE) * length_lu;
+        Some(Settled { count, lands, floors_hold: rests || trial.way_lu <= floors_end_lu, trial })
     }
 
     /// 0 %, while the path moves.
@@ -359,14 +378,6 @@ impl Continuous {
         if above { at_lu } else { 0.0 }
     }
 
-    /// Up to where the speed must not fall below the new feed and the plan before: where that slows down for a place of the path, a plan with the new feed
-    /// leaves it sooner; else up to its own stop.
-    fn floors_end_lu(&self, chain: &Chain, most_lu: f64, expected: &Expected) -> f64 {
-        let length_lu: f64 = chain.intervals.iter().map(Interval::length_lu).sum();
-        let landed = most_lu < (1.0 - WAY_SHARE) * length_lu;
-        if landed { most_lu - expected.landing_lu } else { length_lu - STOP_WAYS * expected.stop_lu }
-    }
-
     /// b at the borders of a chain up to a way that must not be fallen below: what the new feed and the plan before have in common.
     fn floors(&self, chain: &Chain, way_lu: f64) -> Vec<f64> {
         let mut before = self.before();
@@ -465,13 +476,14 @@ fn keeps_velocities(layout: &mut Layout, profile: &Profile, pieces: &[Piece<'_>]
     keeps
 }
 
-impl Trial {
-    /// The new feed holds nowhere in it.
-    fn settles_to_its_end(&self) -> bool {
-        let length_lu: f64 = self.layout.chain.intervals.iter().map(Interval::length_lu).sum();
-        self.way_lu >= (1.0 - WAY_SHARE) * length_lu
-    }
+/// Up to where the speed must not fall below the new feed and the plan before: where that slows down for a place of the path, a plan with the new feed leaves it
+/// sooner; else up to its own stop.
+fn floors_end_lu(length_lu: f64, most_lu: f64, expected: &Expected) -> f64 {
+    let landed = most_lu < (1.0 - WAY_SHARE) * length_lu;
+    if landed { most_lu - expected.landing_lu } else { length_lu - STOP_WAYS * expected.stop_lu }
+}
 
+impl Trial {
     /// What it says about a chain with a shorter way: the same speeds sooner.
     fn shortened(&self, chain: &Chain, way_lu: f64) -> Vec<PathPoint> {
         let mut own = Along::new(&self.layout.chain, &self.profile, 0, 0.0);
