@@ -220,21 +220,50 @@ fn a_blend_that_all_but_turns_back_is_not_crept_along() {
     assert!(time_s < stops_s, "{time_s} s, with exact stops {stops_s} s");
 }
 
+/// An arc of chords with rounded corners, from rest to rest.
+fn chords(count: u32, chord_mm: f64, radius_mm: f64) -> Program {
+    let mut program = Program::new(PathMode::G642, 3000.0);
+    for i in 1..=count {
+        let turned = f64::from(i) * chord_mm / radius_mm;
+        let rounded = |mm: f64| (mm * 1e4).round() / 1e4;
+        program.line(&[rounded(radius_mm * turned.sin()), rounded(radius_mm * (1.0 - turned.cos()))]);
+    }
+    program
+}
+
 /// Where the window ends in a hair of a line between two blends the path still brakes for its end over all that is before it: it went from 50 mm/s to a stop in the
 /// middle of an arc of chords, for a window of several times the way that it takes.
 #[test]
 fn a_window_that_ends_in_next_to_nothing_stops_nobody() {
-    let time_s = |chord_mm: f64, radius_mm: f64, blocks: usize| {
-        let mut program = Program::new(PathMode::G642, 3000.0);
-        for i in 1..=20 {
-            let turned = f64::from(i) * chord_mm / radius_mm;
-            let rounded = |mm: f64| (mm * 1e4).round() / 1e4;
-            program.line(&[rounded(radius_mm * turned.sin()), rounded(radius_mm * (1.0 - turned.cos()))]);
-        }
-        total_s(&program.planned(&Machine { look_ahead_blocks: blocks, ..machine() }))
-    };
-    for (chord_mm, radius_mm, blocks, slower_max_ratio) in [(0.2, 50.0, 8, 1.15), (2.0, 100.0, 10, 1.005)] {
-        let (short_s, long_s) = (time_s(chord_mm, radius_mm, blocks), time_s(chord_mm, radius_mm, 2 * blocks));
+    for (chord_mm, radius_mm, blocks, slower_max_ratio) in
+        [(0.2, 50.0, 8, 1.15), (0.2, 50.0, 10, 1.08), (2.0, 100.0, 10, 1.005)]
+    {
+        let program = chords(20, chord_mm, radius_mm);
+        let time_s = |blocks| total_s(&program.planned(&Machine { look_ahead_blocks: blocks, ..machine() }));
+        let (short_s, long_s) = (time_s(blocks), time_s(2 * blocks));
         assert!(short_s < slower_max_ratio * long_s, "{chord_mm} mm: {short_s} s, with a longer window {long_s} s");
+    }
+}
+
+/// In a window of w blocks of length h the path is about as fast as stops within the w - 1 behind the block at hand, with the jerk J all along: from v that takes the
+/// way v √(v/J), so that v = ∛(J (w - 1)² h²). A plan that was not found was followed to its stop, and dense paths took twice that and more.
+#[test]
+fn dense_blocks_flow_as_fast_as_a_short_window_can_stop() {
+    const COUNT: u32 = 100;
+    for chord_mm in [0.2, 0.5] {
+        let program = chords(COUNT, chord_mm, 250.0 * chord_mm);
+        let time_s = |blocks| total_s(&program.planned(&Machine { look_ahead_blocks: blocks, ..machine() }));
+        let length_mm = f64::from(COUNT) * chord_mm;
+        let jerk = spinner().axis(AxisId::new(0)).limits.jerk_max_lu_s3;
+        let unhindered_s = time_s(50);
+        for blocks in [2_u8, 3, 5, 8] {
+            let stop_mm = f64::from(blocks - 1) * chord_mm;
+            let expected_s = unhindered_s.max(length_mm / (jerk * stop_mm * stop_mm).cbrt());
+            let window_s = time_s(usize::from(blocks));
+            assert!(
+                window_s < 1.25 * expected_s,
+                "{chord_mm} mm, {blocks} blocks: {window_s} s, expected {expected_s}"
+            );
+        }
     }
 }

@@ -312,6 +312,33 @@ fn axis_velocities_hold_while_the_feed_gives_way() {
     }
 }
 
+/// On an arc of chords with rounded corners what the corners take of the jerk makes a change longer than on a line. It comes nevertheless, without a stop on the
+/// way: some were followed only after one, a second later.
+#[test]
+fn dense_rounded_blocks_follow_a_change_without_a_stop() {
+    let mut program = Program::new(PathMode::G642, 3000.0);
+    for i in 1..=400 {
+        let turned = f64::from(i) * 0.004;
+        program.line(&[50.0 * turned.sin(), 50.0 * (1.0 - turned.cos())]);
+    }
+    for shape in [BlendShape::Hermite3, BlendShape::Quintic] {
+        let mut machine = machine();
+        machine.smoothing.shape = shape;
+        let t_s = machine.cycle.time_base.setpoint_period_s();
+        for (change_s, percent) in [(0.6, 10.0), (0.9, 10.0), (0.9, 30.0), (1.2, 50.0)] {
+            let rows = setpoints(&machine, &program, &format!("{change_s}={percent}"));
+            let (from, feed_lu_s) = ((change_s / t_s) as usize, 0.5 * percent);
+            let (line_s, _) = ramp_to_near(&machine, rows[from].path.feed_lu_s, feed_lu_s);
+            let reached = reaches(&rows, from, feed_lu_s);
+            let took_s = (reached - from) as f64 * t_s;
+            assert!(took_s < 3.0 * line_s, "{shape:?}, {change_s} s to {percent} %: {took_s} s, on a line {line_s}");
+            let after = &rows[from..reached + (0.1 / t_s) as usize];
+            let slowest_lu_s = after.iter().fold(f64::INFINITY, |least, row| least.min(row.path.feed_lu_s));
+            assert!(slowest_lu_s > 0.4 * feed_lu_s, "{shape:?}, {change_s} s to {percent} %: {slowest_lu_s} lu/s");
+        }
+    }
+}
+
 #[test]
 fn what_is_no_schedule_is_refused_with_its_place() {
     let columns = |text: &str| {

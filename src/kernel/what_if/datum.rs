@@ -6,7 +6,7 @@ use crate::base::{AxisId, AxisKind};
 use crate::feed::{Limit, LimitKind, PlannedPiece};
 use crate::geometry::Curve;
 use crate::interpreter::{Feed, Move};
-use crate::machine::{AxisLimits, CornerRule, DynamicsMode, Machine, tables};
+use crate::machine::{AxisLimits, CornerRule, DynamicsMode, Machine, PathMode, tables};
 use crate::smoothing::PieceKind;
 use std::sync::Arc;
 
@@ -92,7 +92,9 @@ pub(super) fn behind(machine: &Machine, piece: &PlannedPiece, limit: Limit) -> V
         | LimitKind::Override
         | LimitKind::Spindle => Vec::new(),
     };
-    if blend && limit.kind != LimitKind::Feed && contour.modes.contour_tolerance_mm.is_none() {
+    // A G641 blend is as long as ADIS says.
+    let by_tolerance = contour.modes.path_mode != PathMode::G641 && contour.modes.contour_tolerance_mm.is_none();
+    if blend && limit.kind != LimitKind::Feed && by_tolerance {
         data.push(Some(Datum::ContourTolerance));
     }
     let mut data: Vec<Datum> = data.into_iter().flatten().collect();
