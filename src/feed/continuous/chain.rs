@@ -91,10 +91,6 @@ const ATTEMPTS_MAX: u32 = 8;
 /// By how much limits give way, of what planning does not use of them anyway.
 const LOOSER_RATIOS: [f64; 3] = [0.0, 2e-4, 1.5e-3];
 
-/// By how much they do to find better tangents, and how often.
-const WIDER_RATIOS: [f64; 2] = [0.05, 0.3];
-const DETOURS_MAX: u32 = 3;
-
 /// Steps of the solver after which a problem counts as unsolvable.
 const STEPS_MAX: u32 = 80;
 const HURRIED_STEPS_MAX: u32 = 40;
@@ -112,8 +108,6 @@ pub(super) struct Planning {
     solver: Solver,
     /// Whether there is a profile is to be found out quickly: what is found only with effort counts as none.
     pub hurries: bool,
-    /// Where the tangents of an estimate leave no way others are looked for, which takes longer.
-    pub insists: bool,
     /// The path rests at the end of the chain: no later plan will do it better.
     pub is_last: bool,
     /// So many intervals will be handed out before the next plan, whatever this one is.
@@ -187,15 +181,9 @@ impl Planning {
             return None;
         }
         let mut attempts = 0;
-        let (mut before, mut detours) = (None, 0);
+        let mut before = None;
         for round in 0.. {
             self.solved = self.solve(chain, start, &range);
-            if !self.solved && self.insists && detours < DETOURS_MAX && self.solve_wider(chain, start, &range) {
-                let profile = self.profile(chain, start);
-                self.take_estimate(&profile, &range);
-                detours += 1;
-                continue;
-            }
             if !self.solved {
                 // A profile of earlier tangents obeys the true limits too: it is only slower.
                 return before.filter(|profile| tighten(chain, profile, &range, look));
@@ -384,21 +372,14 @@ impl Planning {
             Start::At(_) if self.hurries => &LOOSER_RATIOS[2..],
             Start::At(_) => &LOOSER_RATIOS,
         };
-        looser.iter().any(|by_ratio| self.solve_loosened(chain, start, range, *by_ratio))
-    }
-
-    fn solve_loosened(&mut self, chain: &Chain, start: Start, range: &std::ops::Range<usize>, by_ratio: f64) -> bool {
         let steps_max = self.steps_max();
-        self.pose(chain, start);
-        self.start_solver(chain, range);
-        self.fix_start(chain, start);
-        self.problem.loosen(by_ratio);
-        self.solver.solve(&mut self.problem, GAP_MAX_RATIO, steps_max) == Outcome::Solved
-    }
-
-    /// Where the tangents of the estimate leave no way, those of the way that wider limits would give may.
-    fn solve_wider(&mut self, chain: &Chain, start: Start, range: &std::ops::Range<usize>) -> bool {
-        start != Start::Rest && WIDER_RATIOS.iter().any(|by_ratio| self.solve_loosened(chain, start, range, *by_ratio))
+        looser.iter().any(|by_ratio| {
+            self.pose(chain, start);
+            self.start_solver(chain, range);
+            self.fix_start(chain, start);
+            self.problem.loosen(*by_ratio);
+            self.solver.solve(&mut self.problem, GAP_MAX_RATIO, steps_max) == Outcome::Solved
+        })
     }
 
     fn steps_max(&self) -> u32 {

@@ -154,7 +154,10 @@ impl Continuous {
             return Change::Planned;
         }
         self.regime.override_ratio = before;
-        self.kept = layout::handed_out(&self.places);
+        if override_ratio < before {
+            // No other plan with the feed before: that which is there brakes for the end of its window, and the slower the path is the sooner there is one.
+            self.kept = layout::handed_out(&self.places);
+        }
         Change::NotYet
     }
 
@@ -230,7 +233,7 @@ impl Continuous {
             let mut layout = layout.clone();
             if way_lu > 0.0 {
                 layout.chain.floors_lu2_s2 = self.floors(&layout.chain, (FLOOR_WAYS * way_lu).min(floors_end_lu));
-                self.settle(&mut layout, pieces, way_lu);
+                self.settle(&mut layout, pieces, start, way_lu);
             }
             let mut trial = self.trial(layout, pieces, start, way_lu, longer)?;
             for _ in 0..SLOWER_ATTEMPTS_MAX {
@@ -287,12 +290,12 @@ impl Continuous {
             Some(longer) => vec![longer.shortened(&layout.chain, way_lu)],
         };
         // Of a plan to a stop all is gone along; of one to another feed the tangents fit further than they need to.
-        (self.planning.hurries, self.planning.is_last, self.planning.insists) = (true, true, true);
+        (self.planning.hurries, self.planning.is_last) = (true, true);
         let profile = {
             let look = look(pieces, &layout.owners);
             hints.iter().find_map(|hints| self.planning.plan(&mut layout.chain, start, hints, &look))
         };
-        (self.planning.hurries, self.planning.insists) = (false, false);
+        self.planning.hurries = false;
         Some(Trial { profile: profile?, layout, way_lu })
     }
 
@@ -396,7 +399,7 @@ impl Continuous {
     }
 
     /// Over a way from where the front stands the caps give way to the speeds of the plan before; a border is made where it ends.
-    pub(super) fn settle(&self, layout: &mut Layout, pieces: &[Piece<'_>], way_lu: f64) {
+    pub(super) fn settle(&self, layout: &mut Layout, pieces: &[Piece<'_>], start: Start, way_lu: f64) {
         let mut before = self.before();
         let mut at_lu = 0.0;
         let mut index = 0;
@@ -424,6 +427,10 @@ impl Continuous {
             interval.cap.velocity_lu_s = interval.cap.velocity_lu_s.max(allowed_lu_s);
             (at_lu, index) = (end_lu, index + 1);
         }
+        if let Start::At(point) = start {
+            // Under the caps before it may have been too fast anyway.
+            layout.cut_rise(&point, pieces);
+        }
     }
 
     /// The same as [`Continuous::attempt`] where caps gave way: what they gave of the feed they may not give of the velocities of the axes.
@@ -433,15 +440,13 @@ impl Continuous {
         pieces: &[Piece<'_>],
         start: Start,
     ) -> Option<Profile> {
-        self.planning.insists = true;
-        let mut attempts = (0..SLOWER_ATTEMPTS_MAX).map_while(|_| {
+        for _ in 0..SLOWER_ATTEMPTS_MAX {
             let profile = self.attempt(layout, pieces, start)?;
-            let keeps = keeps_velocities(layout, &profile, pieces, self.regime.settling_lu);
-            Some((profile, keeps))
-        });
-        let found = attempts.find(|(_, keeps)| *keeps);
-        self.planning.insists = false;
-        found.map(|(profile, _)| profile)
+            if keeps_velocities(layout, &profile, pieces, self.regime.settling_lu) {
+                return Some(profile);
+            }
+        }
+        None
     }
 }
 

@@ -12,6 +12,7 @@ mod along;
 mod chain;
 mod change;
 mod estimate;
+mod further;
 mod grid;
 mod group;
 mod held;
@@ -261,12 +262,22 @@ impl Continuous {
 
     /// A new plan, if there is one.
     fn lay(&mut self, pieces: &mut [Piece<'_>], sight: Sight) -> Result<bool, TooShort> {
-        if sight != Sight::All && pieces.len() <= self.places.len() {
+        // From inside the front everything is cut again.
+        let (changes, all) = (self.regime.point.is_some(), self.places.len());
+        if sight != Sight::All && pieces.len() <= all {
             return Err(TooShort);
         }
+        let known = if changes { 0 } else { self.known() };
+        if self.lay_after(pieces, sight, known)? {
+            return Ok(true);
+        }
+        // What is left of the plan before is a way that keeps every limit, but not on every other grid: so on its own.
+        Ok(!changes && known < all && all < pieces.len() && self.lay_after(pieces, sight, all)?)
+    }
+
+    /// A new plan in which the first `known` pieces are cut as before.
+    fn lay_after(&mut self, pieces: &mut [Piece<'_>], sight: Sight, known: usize) -> Result<bool, TooShort> {
         let start = self.start();
-        // Pieces that are cut as before; from inside the front everything is cut again.
-        let known = if self.regime.point.is_some() { 0 } else { self.known() };
         let known = known.min(pieces.len().saturating_sub(1));
         let Reach { usual, whole } = self.reach(pieces, sight, known, start)?;
         self.usual_only &= start != Start::Rest;
@@ -287,7 +298,7 @@ impl Continuous {
         let pieces = &whole[..count];
         let settles = self.regime.settling_lu > 0.0;
         if settles {
-            self.settle(&mut layout, pieces, self.regime.settling_lu);
+            self.settle(&mut layout, pieces, start, self.regime.settling_lu);
         }
         let planned = if settles {
             self.attempt_settling(&mut layout, pieces, start)
@@ -330,14 +341,13 @@ impl Continuous {
         let mut layout = Layout::continued(&self.chain, self.places.range(..known));
         layout.entry = entry;
         layout.extend(&pieces[..count], known, stretches, start == Start::Rest);
-        // Not where the front is cut again: under a changing override such a plan went 0.5 % above F (tests/proof, overridden, seed 31).
-        if known > 0 && !pieces[..count].last().is_some_and(|last| last.rests_after) {
+        if !pieces[..count].last().is_some_and(|last| last.rests_after) {
             layout.grade_stop(known, pieces);
         }
         if self.regime.from_lu > 0.0 && known == 0 {
             layout.frees_start();
         }
-        if let (Start::At(point), true) = (start, self.regime.point.is_some() && known == 0) {
+        if let (Start::At(point), 0) = (start, known) {
             layout.cut_rise(&point, pieces);
         }
         layout
@@ -372,7 +382,12 @@ impl Continuous {
         let look = look(pieces, owners);
         self.planning.is_last = pieces.last().is_some_and(|last| last.rests_after);
         self.planning.handed_out = handed_out;
-        self.planning.plan(chain, start, &points[..fast], &look)
+        let planned = self.planning.plan(chain, start, &points[..fast], &look);
+        if planned.is_some() || points.len() <= fast {
+            return planned;
+        }
+        let further = self.stop_further_on(chain);
+        self.planning.plan(chain, start, &further, &look).or_else(|| self.planning.plan(chain, start, &points, &look))
     }
 
     /// What was planned before, at the borders of a new chain from the front on; how many of them do not brake for the end of the window.
