@@ -9,7 +9,7 @@
 
 use super::limits::{AxisRules, Ends};
 use super::profile::SpeedCap;
-use super::{Limit, LimitKind};
+use super::{Limit, LimitKind, TimeLaw};
 use crate::base::AxisVector;
 use crate::machine::CurvatureJump;
 use std::sync::Arc;
@@ -23,6 +23,15 @@ pub(super) const STOP: SpeedCap = SpeedCap { velocity_lu_s: 0.0, limit: Limit { 
 /// Nothing binds here.
 pub(super) const FREE: SpeedCap =
     SpeedCap { velocity_lu_s: f64::INFINITY, limit: Limit { kind: LimitKind::Feed, axis: None } };
+
+/// A junction is reached with this share of its speed: plans keep a little off it.
+const REACHED_SHARE: f64 = 0.998;
+
+/// The limit of a junction that a motion from it begins with.
+pub(super) fn holding(junction: SpeedCap, law: &TimeLaw) -> Option<Limit> {
+    let moves = junction.velocity_lu_s > 0.0 && junction.velocity_lu_s.is_finite();
+    (moves && law.at(0.0).velocity_lu_s >= REACHED_SHARE * junction.velocity_lu_s).then_some(junction.limit)
+}
 
 /// Highest speed from `before` to `after`: where their modes differ, both have to allow it.
 pub(super) fn cap(rules: [&Arc<AxisRules>; 2], before: &Ends, after: &Ends) -> SpeedCap {

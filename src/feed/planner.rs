@@ -364,22 +364,22 @@ impl Planner {
         if self.continuous.is_some() && !matches!(front.motion, Motion::Flows(_)) {
             self.stand_by(&front.path, &law);
         }
-        if matches!((&front.motion, &front.path.contour.kind), (Motion::Moves { .. }, PieceKind::Blend(..))) {
-            self.crept.crossed(&self.rules.of(&front.path.contour.modes), &front.path, law.duration_s());
-        }
+        self.count(&front, &law);
         self.actions.pass(&front.path);
         let start_s = self.elapsed_s;
         self.elapsed_s += law.duration_s();
         let overrides = self.overrides.steps(start_s, self.elapsed_s);
-        if matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_) | Motion::Threads(_))
-            && front.path.contour.feed != Feed::Rapid
-        {
-            self.cutting_s += law.duration_s();
-        }
         self.waits.begin(waits_at_end, &front.path);
-        let buffered_blocks = self.blocks_beyond;
-        let piece =
-            PlannedPiece { path: front.path, law, buffered_blocks, positionings, overrides, spindle, waits_at_end };
+        let piece = PlannedPiece {
+            junction: junction::holding(front.corner, &law),
+            path: front.path,
+            law,
+            buffered_blocks: self.blocks_beyond,
+            positionings,
+            overrides,
+            spindle,
+            waits_at_end,
+        };
         self.entry = exit;
         self.admitted -= 1;
         self.changed_from = self.changed_from.saturating_sub(1);

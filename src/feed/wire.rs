@@ -234,6 +234,8 @@ pub struct PlannedPiece {
     pub spindle: Option<SpindleMotion>,
     /// The next piece begins only when the axes are in position.
     pub waits_at_end: bool,
+    /// What the junction at its start holds the speed with, where the path passes it as fast as that allows: a corner that stays, a jump of the curvature.
+    pub junction: Option<Limit>,
 }
 
 /// How the master spindle moves from the start of a piece on.

@@ -93,6 +93,26 @@ fn savings_under_the_continuous_law_are_those_of_full_runs() {
     agrees(&shipped_program("spline.mpf"), "spinner_mvc850", &sets, 5e-4);
 }
 
+/// On the ramps between sharp corners only the jerk holds the feed: what makes the motion slow are the speeds at the corners.
+#[test]
+fn corners_that_stay_have_a_price_under_both_laws() {
+    let points = (1..=40).map(|i| format!("X{} Y{}\n", 3 * i, 3 * ((i + 1) % 2)));
+    let text = format!("G17 G71 G90 G94 G64 F6000\nG1\n{}M30\n", points.collect::<String>());
+    let zigzag = ProgramSource::from_bytes("zigzag.mpf", text.as_bytes());
+    for law in ["feed.time_law=seven-phase", "feed.time_law=continuous"] {
+        for (sets, key) in [
+            (vec![law], "axes.Y.follow_up_tolerance_mm"),
+            (vec![law, "feed.corner_rule=overload"], "feed.overload_factor"),
+        ] {
+            let costs = agrees(&zigzag, "spinner_mvc850", &sets, 2e-4);
+            let most = costs.savings.iter().position(|saving| saving.key == key);
+            assert!(most.is_some_and(|rank| rank < 2), "{law}: {key} is not what costs most: {:?}", costs.savings);
+            let lines = most.map(|rank| costs.savings[rank].lines.len());
+            assert!(lines.is_some_and(|lines| lines >= 38), "{law}: {key} binds in {lines:?} lines, at 39 corners");
+        }
+    }
+}
+
 /// A long path at F with a corner now and then.
 fn mostly_straight(corners: u32, straight: u32) -> ProgramSource {
     let mut text = String::from("N1 G17 G71 G90 G94 G642 CTOL=0.1 SOFT F6000\nN2 G1 X0 Y0\n");

@@ -1,12 +1,15 @@
-//! What has no law: motions without a speed, motions and waits that take for ever.
+//! What has no law: motions without a speed, motions and waits that take for ever. And what is counted of those that have one.
 //!
 //! In: what is known of a piece that was pushed. Out: an alarm, or nothing. Does not plan.
 
+use super::{Entry, Motion, Planner};
 use crate::base::Diagnostic;
+use crate::feed::TimeLaw;
 use crate::feed::continuous::Flowing;
 use crate::feed::limits::{AxisRules, Ends, PieceLimits};
 use crate::feed::modes::ModeRules;
 use crate::geometry::Curve;
+use crate::interpreter::Feed;
 use crate::kinematics::{JointPath, JointState};
 use crate::program::BlockRef;
 use crate::smoothing::PieceKind;
@@ -128,4 +131,17 @@ pub(super) fn held(block: BlockRef) -> Diagnostic {
     let message = format!("the feed override is 0 from line {} on, and nothing raises it again", block.line);
     Diagnostic::error("P0005", message)
         .help("look at the synchronised actions on $AC_OVR, and at the last change of --override")
+}
+
+impl Planner {
+    /// What is told at the end: blends that creep, the time for which a feed holds.
+    pub(super) fn count(&mut self, front: &Entry, law: &TimeLaw) {
+        if matches!((&front.motion, &front.path.contour.kind), (Motion::Moves { .. }, PieceKind::Blend(..))) {
+            self.crept.crossed(&self.rules.of(&front.path.contour.modes), &front.path, law.duration_s());
+        }
+        let moves = matches!(front.motion, Motion::Moves { .. } | Motion::Flows(_) | Motion::Threads(_));
+        if moves && front.path.contour.feed != Feed::Rapid {
+            self.cutting_s += law.duration_s();
+        }
+    }
 }

@@ -11,7 +11,7 @@ mod datum;
 mod places;
 
 use super::preparation::{PieceSource, Preparation};
-use crate::feed::{PlannedPiece, Planner};
+use crate::feed::{Phase, PlannedPiece, Planner};
 use crate::interpreter::{Event, Move, MoveKind, Setup};
 use crate::kinematics::Kinematics;
 use crate::machine::Machine;
@@ -144,6 +144,12 @@ impl<'a> Run<'a> {
             }
             for datum in beside(machine, &piece) {
                 bind(&mut run.bindings, datum, at, 0.0);
+            }
+            // What a junction costs is the way up from it; the way down to it is as long.
+            let faster = |phase: &&Phase| phase.at(phase.duration_s).velocity_lu_s > phase.velocity_lu_s;
+            let rise_s: f64 = piece.law.phases().iter().take_while(faster).map(|phase| phase.duration_s).sum();
+            for datum in piece.junction.into_iter().flat_map(|limit| behind(machine, &piece, limit)) {
+                bind(&mut run.bindings, datum, at, rise_s);
             }
             for phase in piece.law.phases() {
                 for datum in behind(machine, &piece, phase.limit) {
