@@ -59,6 +59,11 @@ const CURVATURE_STEP_MIN_PER_MM: f64 = 1e-6;
 /// The same as share of the greater curvature: rounding of a fitted curve.
 const CURVATURE_STEP_MIN_RATIO: f64 = 1e-6;
 
+/// Where the compressor has left less than this share of the tolerances in half of a block the blend takes less of it, down to the last of these: at its ends a
+/// compressed block is where it was programmed.
+const LEFT_SHARE_MIN: f64 = 0.1;
+const REACH_RATIOS: [f64; 4] = [1.0, 0.25, 0.0625, 0.015625];
+
 /// Places at which what the compressor moved is looked at, over the part of a block that a blend may take; and what is kept for
 /// what they miss between them.
 const MOVED_SAMPLES: usize = 8;
@@ -142,7 +147,14 @@ impl Rules {
         if !turns && mode != PathMode::G645 {
             return Junction::Pass;
         }
-        joint.left_share = 1.0 - self.moved_share(before, half_lu, true).max(self.moved_share(after, half_lu, false));
+        for reach_ratio in REACH_RATIOS {
+            let reach_lu = reach_ratio * half_lu;
+            let moved_share = self.moved_share(before, reach_lu, true).max(self.moved_share(after, reach_lu, false));
+            (joint.room.half_lu, joint.left_share) = (reach_lu, 1.0 - moved_share);
+            if joint.left_share >= LEFT_SHARE_MIN {
+                break;
+            }
+        }
         if turns { self.corner(&joint) } else { self.tangential(&joint) }
     }
 

@@ -368,6 +368,28 @@ fn corners_and_long_blocks_stay() {
     assert_eq!(polynomials(&contour(&compressed(&points, Compressor::Cad, 1.0))), 0);
 }
 
+/// Two compressed blocks with a corner between them: where the first one is all of the tolerance away from its points, half of it is no room for a blend, but a
+/// part of it is. The corner stayed, as in G64.
+#[test]
+fn a_corner_beside_a_compressed_block_that_uses_the_tolerance_is_rounded() {
+    let points: Vec<Vec<f64>> =
+        [[-0.42494, -3.12392, 0.0], [-0.83839, -7.91188, 0.21753], [-0.06771, -14.41088, 0.76147]]
+            .map(Vec::from)
+            .into();
+    let moves = compressed(&points, Compressor::Curvature, 0.05);
+    let pieces = contour(&moves);
+    check_contour(&moves, &pieces, "corner");
+    assert_eq!(corners(&pieces).len(), 1);
+    let mut ends = vec![vector(&[0.0])];
+    ends.extend(points.iter().map(|point| vector(point)));
+    let distance = |q: AxisVector| {
+        ends.windows(2).map(|pair| distance_to_segment(q, pair[0], pair[1])).fold(f64::INFINITY, f64::min)
+    };
+    for curve in curves(&pieces) {
+        assert!(samples(curve).map(distance).fold(0.0, f64::max) <= 0.05);
+    }
+}
+
 #[test]
 fn memory_does_not_grow_with_the_run() {
     for compressor in KINDS {
