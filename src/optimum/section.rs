@@ -37,7 +37,8 @@ const EXCEEDED_VELOCITY_RATIO: f64 = 1.0005;
 const TIGHTENINGS_MAX: usize = 4;
 const ALLOWED_RATIO: f64 = 1.0003;
 
-/// Of the control's motion, which is taken where it is faster, so many places of each phase.
+/// The control's motion is taken where it is faster by more than this share; so many places of each of its phases.
+const DRIVEN_GAIN_RATIO: f64 = 1e-3;
 const PHASE_PLACES: usize = 8;
 
 /// Where b comes out negative it begins again at this share of the least beside it.
@@ -227,7 +228,7 @@ impl<'a> Section<'a> {
         let Self { pieces, grid, .. } = self;
         let path = pieces.iter().map(|piece| piece.path.clone()).collect();
         let driven = driven_motion(pieces);
-        if driven.time_s < time_s {
+        if driven.time_s < (1.0 - DRIVEN_GAIN_RATIO) * time_s {
             return OptimalMotion { path, ..driven };
         }
         let place = |index: usize| {
@@ -238,6 +239,8 @@ impl<'a> Section<'a> {
             let velocity_lu_s = profile.squares[index].sqrt();
             SpeedPlace { place_lu, velocity_lu_s, acceleration_lu_s2: profile.slopes[index] / 2.0 }
         };
+        // Where both are the same but for the grid nobody is faster than the other.
+        let time_s = time_s.min(driven.time_s);
         OptimalMotion { time_s, places: (0..profile.squares.len()).map(place).collect(), path }
     }
 }

@@ -26,7 +26,7 @@ pub struct Optimum {
 pub struct OptimalMotion {
     /// The path, in order.
     pub path: Vec<JointPath>,
-    /// Length of the time.
+    /// The least time that is known: the motion at `places` takes up to a thousandth more where the control drives it faster than they say.
     pub time_s: f64,
     /// Speed at places, in order; between two of them v² is the cubic with these values and slopes, before the first and after the last
     /// one the motion has constant jerk (constant acceleration where the jerk is not limited) from rest and to rest.
