@@ -200,12 +200,15 @@ impl Continuous {
         for wider_ratio in WIDER_RATIOS {
             let expected = self.expect(pieces, start, false, wider_ratio);
             let count = self.usual_reach(pieces, start);
-            // The window has no more, or what there is was enough.
-            if count <= seen || found.as_ref().is_some_and(|found| found.lands) {
+            if count <= seen {
+                // The window has no more.
                 break;
             }
             seen = count;
             found = self.settled(&mut pieces[..count], start, &expected).or(found);
+            if found.as_ref().is_some_and(|found| found.lands) {
+                break;
+            }
         }
         let Some(Settled { trial: Trial { layout, profile, way_lu }, count, floors_hold, .. }) = found else {
             [self.regime.moving_ratio, self.regime.fastest_ratio] = before;
